@@ -1,0 +1,46 @@
+# Everything runs in a virtual environment under .venv, made on first use. PYTHON picks the interpreter:
+# 3.11 brings Blender 4.5 LTS as the module bpy, 3.13 brings 5.2 LTS.
+find_python = $(firstword $(foreach p,$(1),$(shell $(p) -c 'print("$(p)")' 2>/dev/null)))
+PYTHON_311 := $(call find_python,python3.11 $(wildcard $(HOME)/.pyenv/versions/3.11.*/bin/python))
+PYTHON_313 := $(call find_python,python3.13 $(wildcard $(HOME)/.pyenv/versions/3.13.*/bin/python))
+PYTHON ?= $(firstword $(PYTHON_311) $(PYTHON_313) python3)
+
+VERSION = $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])')
+VENV = .venv/$(VERSION)
+RUN = $(VENV)/bin/python
+
+.PHONY: demo test test-all bench lint clean
+
+demo: $(VENV)/runs
+	$(RUN) scripts/demo.py --out out/demo
+
+test: $(VENV)/tests
+	$(RUN) -m pytest $(ARGS)
+
+# Both Blender versions, as far as their Pythons are there.
+test-all:
+	@test -n "$(PYTHON_311)$(PYTHON_313)" || { echo "neither Python 3.11 nor 3.13 found"; exit 1; }
+	@if [ -n "$(PYTHON_311)" ]; then $(MAKE) test PYTHON=$(PYTHON_311); else echo "no Python 3.11: Blender 4.5 not tested"; fi
+	@if [ -n "$(PYTHON_313)" ]; then $(MAKE) test PYTHON=$(PYTHON_313); else echo "no Python 3.13: Blender 5.2 not tested"; fi
+
+bench: $(VENV)/runs
+	$(RUN) scripts/bench.py $(ARGS)
+
+lint: $(VENV)/tests
+	$(VENV)/bin/ruff check .
+	$(VENV)/bin/ruff format --check .
+	$(VENV)/bin/mypy
+
+$(VENV)/runs: requirements.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] not in ((3, 11), (3, 13)))' || \
+	  { echo "Python $(VERSION) has no bpy; make PYTHON=... with a Python 3.11 or 3.13 (with venv)"; exit 1; }
+	test -x $(RUN) || $(PYTHON) -m venv $(VENV)
+	$(RUN) -m pip install --quiet --disable-pip-version-check -r requirements.txt
+	@touch $@
+
+$(VENV)/tests: requirements-dev.txt $(VENV)/runs
+	$(RUN) -m pip install --quiet --disable-pip-version-check -r requirements-dev.txt
+	@touch $@
+
+clean:
+	rm -rf .venv out dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Opening files as measurable meshes. For scripts: a file replaces what the session holds."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import bpy
+
+from ..metric.color import Texture
+from ..metric.errors import FileError, FMQMError, MeshError
+from ..metric.surface import MeshArrays
+from .mesh import mesh_arrays
+
+_OBJECT_IN_BLEND = re.compile(r"(.*?\.blend):(.+)", re.IGNORECASE | re.DOTALL)
+
+
+def load_mesh(spec: str, texture: Texture | None = None) -> MeshArrays:
+    """The asset in a file as one mesh in its world frame; nothing stays in the session.
+
+    Args:
+        spec: a path, or "file.blend:Object name" for one object, hidden or not. Of a whole file the
+            render-visible meshes count.
+        texture: replaces the base-color images of the whole asset.
+
+    Raises:
+        FileError: the file is missing, unreadable or of an unknown kind, or has no such object.
+        MeshError: it holds nothing that can be measured.
+    """
+    path, object_name = split_spec(spec)
+    try:
+        open_file(path)
+        objects = [_named(object_name, path)] if object_name else measured_objects()
+        try:
+            if not objects:
+                raise MeshError("no mesh in it; a surface is wanted")
+            return mesh_arrays(objects, object_name or Path(path).name, texture)
+        except FMQMError as error:
+            raise type(error)(f"{spec}: {error}") from error
+    finally:
+        _clear_session()
+
+
+def open_file(path: str) -> None:
+    """Opens or imports a file into an emptied session.
+
+    Raises:
+        FileError: the file is missing, unreadable or of an unknown kind.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in SUFFIXES:
+        raise FileError(f"{path}: unknown file ending {suffix or '(none)'}; known: {' '.join(SUFFIXES)}")
+    if not os.path.isfile(path):
+        raise FileError(f"{path}: no such file")
+    if not os.access(path, os.R_OK):
+        raise FileError(f"{path}: permission denied; the file cannot be read")
+    _clear_session()
+    try:
+        _open(os.path.abspath(path), suffix)
+    except RuntimeError as error:
+        raise FileError(f"{path}: {_last_line(error)}") from error
+
+
+def split_spec(spec: str) -> tuple[str, str]:
+    """Path and object name ("" for the whole file); drive letters stay with the path."""
+    match = None if os.path.isfile(spec) else _OBJECT_IN_BLEND.fullmatch(spec)
+    return (match[1], match[2]) if match else (spec, "")
+
+
+def _clear_session() -> None:
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+
+
+def _open(path: str, suffix: str) -> None:
+    """Opens or imports a file into the empty session."""
+    if suffix == ".blend":
+        bpy.ops.wm.open_mainfile(filepath=path, load_ui=False, use_scripts=False)
+        return
+    operator = _IMPORTERS[suffix]()
+    try:
+        operator.get_rna_type()
+    except KeyError as error:
+        raise FileError(
+            f"{path}: this Blender has no importer for {suffix}; convert the file, for example to .glb"
+        ) from error
+    result = operator(filepath=path)
+    if "FINISHED" not in result:
+        raise FileError(f"{path}: the importer refused it ({', '.join(result).lower()})")
+
+
+_IMPORTERS: dict[str, Callable[[], bpy.types.Operator]] = {
+    ".obj": lambda: bpy.ops.wm.obj_import,
+    ".ply": lambda: bpy.ops.wm.ply_import,
+    ".stl": lambda: bpy.ops.wm.stl_import,
+    ".glb": lambda: bpy.ops.import_scene.gltf,
+    ".gltf": lambda: bpy.ops.import_scene.gltf,
+    ".fbx": lambda: bpy.ops.wm.fbx_import,
+    ".usd": lambda: bpy.ops.wm.usd_import,
+    ".usda": lambda: bpy.ops.wm.usd_import,
+    ".usdc": lambda: bpy.ops.wm.usd_import,
+    ".usdz": lambda: bpy.ops.wm.usd_import,
+    ".abc": lambda: bpy.ops.wm.alembic_import,
+}
+SUFFIXES = (*_IMPORTERS, ".blend")
+
+
+def _named(name: str, path: str) -> bpy.types.Object:
+    found = bpy.data.objects.get(name)
+    if found is None:
+        raise FileError(f"{path}: no object named {name} in it")
+    if found.type != "MESH":
+        raise MeshError(f"{path}:{name}: the object is of type {found.type.lower()}; a mesh is wanted")
+    return found
+
+
+def measured_objects() -> list[bpy.types.Object]:
+    """The render-visible mesh objects of the active scene, by name: the order must not depend on the file's."""
+    visible: dict[str, bpy.types.Object] = {}
+
+    def visit(layer: bpy.types.LayerCollection) -> None:
+        if layer.exclude or layer.collection.hide_render:
+            return
+        for object_ in layer.collection.objects:
+            if object_.type == "MESH" and not object_.hide_render:
+                visible[object_.name_full] = object_
+        for child in layer.children:
+            visit(child)
+
+    visit(bpy.context.view_layer.layer_collection)
+    return [visible[name] for name in sorted(visible)]
+
+
+def _last_line(error: RuntimeError) -> str:
+    """Operators put a report, or a whole traceback, into the error; its last line says what happened."""
+    lines = [line.strip() for line in str(error).splitlines() if line.strip() and not line.startswith("Location:")]
+    return lines[-1].removeprefix("Error: ") if lines else "the importer failed without saying why"

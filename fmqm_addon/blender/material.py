@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What color a material slot has: the image or plain color that feeds Base Color."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..metric.color import Color, Extension, PlainColor, Texture, encode_srgb
+from ..metric.errors import FileError, MeshError
+
+DEFAULT_GREY = 0.8  # linear base color that Blender gives a surface without a material
+_EXTENSIONS: dict[str, Extension] = {"REPEAT": "repeat", "EXTEND": "extend", "CLIP": "clip", "MIRROR": "mirror"}
+
+
+@dataclass(frozen=True)
+class SlotColor:
+    """What one material slot looks like.
+
+    Attributes:
+        color: the texture or the plain color.
+        uv_map: name of the UV map that the texture uses, "" for the mesh's active one; None: needs none.
+        warnings: what was assumed.
+    """
+
+    color: Color
+    uv_map: str | None
+    warnings: tuple[str, ...] = ()
+
+
+class TextureCache:
+    """Pixels of images, read once for all the slots and objects of an asset."""
+
+    def __init__(self) -> None:
+        self._pixels: dict[int, NDArray[np.uint8] | NDArray[np.float32]] = {}
+
+    def pixels(self, image: bpy.types.Image) -> NDArray[np.uint8] | NDArray[np.float32]:
+        key = image.as_pointer()
+        if key not in self._pixels:
+            self._pixels[key] = read_pixels(image)
+        return self._pixels[key]
+
+
+def slot_color(material: bpy.types.Material | None, cache: TextureCache, owner: str) -> SlotColor:
+    """The color of a material slot of the object named owner.
+
+    Raises:
+        MeshError: the base color names an image that cannot be read.
+    """
+    if material is None:
+        grey = _plain((DEFAULT_GREY,) * 3)
+        return SlotColor(
+            grey, None, (f"{owner}: a material slot or the object has no material; Blender's default grey is taken",)
+        )
+    shader = _principled(material)
+    if shader is None:
+        color = _plain(material.diffuse_color[:3])
+        return SlotColor(
+            color, None, (f"{owner}: material {material.name} has no Principled BSDF; its viewport color is taken",)
+        )
+    socket = shader.inputs["Base Color"]
+    node = _source(socket)
+    if node is None:
+        return SlotColor(_plain(socket.default_value[:3]), None)
+    warnings: tuple[str, ...] = ()
+    if node.type != "TEX_IMAGE":
+        found = _first_image_above(node)
+        if found is None:
+            why = (
+                f"{owner}: material {material.name}: Base Color comes from {node.name}, which is not read; "
+                "its plain color is taken"
+            )
+            return SlotColor(_plain(socket.default_value[:3]), None, (why,))
+        warnings = (
+            f"{owner}: material {material.name}: of what feeds Base Color only the image {found.image.name} is read",
+        )
+        node = found
+    vector = _source(node.inputs["Vector"])
+    uv_map = vector.uv_map if vector is not None and vector.type == "UVMAP" else ""
+    if vector is not None and vector.type not in {"UVMAP", "TEX_COORD"}:
+        warnings += (f"{owner}: material {material.name}: {vector.name} before its image is not read",)
+    texture = Texture(
+        cache.pixels(node.image),
+        extension=_EXTENSIONS[node.extension],
+        interpolation="closest" if node.interpolation == "Closest" else "linear",
+    )
+    return SlotColor(texture, uv_map, warnings)
+
+
+def read_pixels(image: bpy.types.Image) -> NDArray[np.uint8] | NDArray[np.float32]:
+    """(H, W, 3) pixels as encoded for display, row 0 at the top; uint8, or float32 in [0, 1] for float images.
+
+    Raises:
+        MeshError: the image is missing or broken; the text names its path.
+    """
+    width, height = image.size
+    if not width or not height:
+        path = bpy.path.abspath(image.filepath, library=image.library) or image.name
+        state = "is broken or of a kind that Blender cannot read" if os.path.exists(path) else "is missing"
+        raise MeshError(f"{path}: the base-color image {state}; repair it or give another (--texture, --ref-texture)")
+    values = np.empty(width * height * image.channels, np.float32)
+    image.pixels.foreach_get(values)
+    values = values.reshape(height, width, image.channels)[::-1]
+    rgb = values[:, :, :3] if image.channels >= 3 else np.repeat(values[:, :, :1], 3, axis=2)
+    if image.is_float:
+        encoded: NDArray[np.float32] = encode_srgb(np.nan_to_num(rgb)).astype(np.float32)
+        return encoded
+    return (rgb * 255 + 0.5).astype(np.uint8)
+
+
+def load_texture(path: str) -> Texture:
+    """An image file as a repeating texture; nothing stays in bpy.data.
+
+    Raises:
+        FileError: it cannot be read.
+    """
+    if not os.path.isfile(path):
+        raise FileError(f"{path}: no such image file")
+    try:
+        image = bpy.data.images.load(path, check_existing=False)
+    except RuntimeError as error:
+        raise FileError(f"{path}: not an image that Blender can read") from error
+    try:
+        return Texture(read_pixels(image))
+    except MeshError as error:
+        raise FileError(f"{path}: not an image that Blender can read") from error
+    finally:
+        bpy.data.images.remove(image)
+
+
+def _plain(linear: tuple[float, ...]) -> PlainColor:
+    red, green, blue = encode_srgb(np.array(linear)).tolist()
+    return PlainColor((red, green, blue))
+
+
+def _principled(material: bpy.types.Material) -> bpy.types.Node | None:
+    """The Principled BSDF at the active output, else any in the tree."""
+    tree = material.node_tree
+    if tree is None:
+        return None
+    output = tree.get_output_node("ALL")
+    shader = _source(output.inputs["Surface"]) if output is not None else None
+    if shader is not None and shader.type == "BSDF_PRINCIPLED":
+        return shader
+    return next((node for node in tree.nodes if node.type == "BSDF_PRINCIPLED"), None)
+
+
+def _source(socket: bpy.types.NodeSocket) -> bpy.types.Node | None:
+    """The node that feeds a socket, through reroutes; None where nothing does."""
+    while socket.is_linked:
+        node = socket.links[0].from_node
+        if node.type != "REROUTE":
+            return node
+        socket = node.inputs[0]
+    return None
+
+
+def _first_image_above(node: bpy.types.Node) -> bpy.types.Node | None:
+    """The nearest image texture upstream of a node, breadth first."""
+    queue, seen = [node], set()
+    while queue:
+        node = queue.pop(0)
+        if node.type == "TEX_IMAGE" and node.image is not None:
+            return node
+        seen.add(node.name)
+        sources = (_source(socket) for socket in node.inputs)
+        queue += [source for source in sources if source is not None and source.name not in seen]
+    return None

@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Evaluated, triangulated arrays of one or many objects."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..metric.color import Color, Texture
+from ..metric.errors import MeshError
+from ..metric.spatial import Floats
+from ..metric.surface import MeshArrays
+from .material import SlotColor, TextureCache, slot_color
+
+
+def mesh_arrays(objects: Sequence[bpy.types.Object], name: str, texture: Texture | None = None) -> MeshArrays:
+    """The objects as one mesh: modifiers applied, triangulated, in the world frame.
+
+    Args:
+        name: what messages call the whole.
+        texture: replaces what the materials say.
+
+    Raises:
+        MeshError: none of the objects has a face, or a color cannot be read.
+    """
+    cache = TextureCache()
+    parts = []
+    with evaluated(objects) as pairs:
+        for object_, depsgraph in pairs:
+            part = _object_arrays(object_, depsgraph, texture, cache)
+            if part is not None:
+                parts.append(part)
+    if not parts:
+        what = "the mesh has no faces" if objects else "no mesh in it"
+        raise MeshError(f"{name}: {what}; a surface is wanted")
+    return _join(parts, name)
+
+
+@contextmanager
+def evaluated(
+    objects: Sequence[bpy.types.Object],
+) -> Iterator[list[tuple[bpy.types.Object, bpy.types.Depsgraph]]]:
+    """The evaluated counterparts of objects, each with the depsgraph it belongs to.
+
+    Objects that the view layer leaves out (excluded collection, disabled in viewports) have no evaluated
+    data there; they are evaluated as temporary duplicates in a temporary scene.
+    """
+    for object_ in objects:
+        if object_.mode == "EDIT":
+            object_.update_from_editmode()
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    depsgraph.update()
+    found = [object_.evaluated_get(depsgraph) for object_ in objects]
+    left_out = [index for index, object_ in enumerate(found) if not object_.is_evaluated]
+    if not left_out:
+        yield [(object_, depsgraph) for object_ in found]
+        return
+    frame = bpy.context.scene.frame_current
+    scene = bpy.data.scenes.new("FMQM evaluation")
+    duplicates: dict[int, bpy.types.Object] = {}
+    try:
+        scene.frame_current = frame
+        for index in left_out:
+            duplicates[index] = duplicate = objects[index].copy()
+            duplicate.hide_viewport = False
+            scene.collection.objects.link(duplicate)
+        view_layer = scene.view_layers[0]
+        view_layer.update()
+        aside = view_layer.depsgraph
+        yield [
+            (duplicates[index].evaluated_get(aside), aside) if index in duplicates else (object_, depsgraph)
+            for index, object_ in enumerate(found)
+        ]
+    finally:
+        for duplicate in duplicates.values():
+            bpy.data.objects.remove(duplicate)
+        bpy.data.scenes.remove(scene)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """One object: the fields of MeshArrays, with colors of its own."""
+
+    positions: Floats
+    triangles: NDArray[np.int32]
+    uv: NDArray[np.float32]
+    material: NDArray[np.int32]
+    colors: list[Color]
+    warnings: list[str]
+
+
+def _object_arrays(
+    object_: bpy.types.Object, depsgraph: bpy.types.Depsgraph, texture: Texture | None, cache: TextureCache
+) -> _Part | None:
+    """Arrays of one evaluated object; None if it has no faces."""
+    mesh = object_.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph)
+    try:
+        if mesh is None or not len(mesh.polygons):
+            return None
+        local = _read(mesh.vertices, "co", (len(mesh.vertices), 3), np.float32)
+        matrix = np.array(object_.matrix_world, np.float64)
+        faces = mesh.loop_triangles
+        triangles = _read(faces, "vertices", (len(faces), 3), np.int32)
+        loops = _read(faces, "loops", (len(faces), 3), np.int32)
+        polygon = _read(faces, "polygon_index", (len(faces),), np.int32)
+        slot = _read(mesh.polygons, "material_index", (len(mesh.polygons),), np.int32)[polygon]
+        slots, material = np.unique(slot, return_inverse=True)
+
+        name = object_.name
+        if texture is not None:
+            looks = [SlotColor(texture, "")] * len(slots)
+        else:
+            looks = [slot_color(_slot_material(object_, index), cache, name) for index in slots.tolist()]
+        uv = np.zeros((len(faces), 3, 2), np.float32)
+        for index, look in enumerate(looks):
+            if look.uv_map is not None:
+                here = material == index
+                uv[here] = _uv_map(mesh, look.uv_map, name)[loops[here]]
+        return _Part(
+            positions=local.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3],
+            triangles=triangles,
+            uv=np.nan_to_num(uv, posinf=0, neginf=0),
+            material=material.astype(np.int32),
+            colors=[look.color for look in looks],
+            warnings=[warning for look in looks for warning in look.warnings],
+        )
+    finally:
+        object_.to_mesh_clear()
+
+
+def _slot_material(object_: bpy.types.Object, index: int) -> bpy.types.Material | None:
+    """Blender draws a face whose slot does not exist with the last slot there is."""
+    slots = object_.material_slots
+    return slots[min(index, len(slots) - 1)].material if len(slots) else None
+
+
+def _uv_map(mesh: bpy.types.Mesh, name: str, owner: str) -> NDArray[np.float32]:
+    """(loops, 2) of the named UV map; "" is the one active for rendering."""
+    layers = mesh.uv_layers
+    layer = layers.get(name) if name else next((layer for layer in layers if layer.active_render), None)
+    if layer is None:
+        raise MeshError(
+            f"{owner}: the mesh has no UV map{f' named {name}' if name else ''}, which its image needs; unwrap it first"
+        )
+    return _read(layer.uv, "vector", (len(mesh.loops), 2), np.float32)
+
+
+def _read(
+    collection: bpy.types.bpy_prop_collection, attribute: str, shape: tuple[int, ...], dtype: type
+) -> NDArray[Any]:
+    values: NDArray[Any] = np.empty(shape, dtype)
+    collection.foreach_get(attribute, values.reshape(-1))
+    return values
+
+
+def _join(parts: list[_Part], name: str) -> MeshArrays:
+    vertex_start = np.cumsum([0] + [len(part.positions) for part in parts[:-1]])
+    color_start = np.cumsum([0] + [len(part.colors) for part in parts[:-1]])
+    return MeshArrays(
+        name=name,
+        positions=np.concatenate([part.positions for part in parts]),
+        triangles=np.concatenate([part.triangles + start for part, start in zip(parts, vertex_start, strict=True)]),
+        uv=np.concatenate([part.uv for part in parts]),
+        material=np.concatenate([part.material + start for part, start in zip(parts, color_start, strict=True)]),
+        colors=tuple(color for part in parts for color in part.colors),
+        warnings=tuple(dict.fromkeys(warning for part in parts for warning in part.warnings)),
+    )

@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The process that a script runs in: a bpy that imports, a standard output of its own."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+from typing import TextIO
+
+from ..metric.errors import FMQMError
+
+SYSTEM_PACKAGES = "libx11-6 libxrender1 libxxf86vm1 libxfixes3 libxi6 libxkbcommon0 libsm6 libice6 libgl1 libegl1"
+
+
+def require_bpy() -> None:
+    """Imports bpy.
+
+    Raises:
+        FMQMError: it cannot be imported; the text says what to install.
+    """
+    try:
+        importlib.import_module("bpy")
+    except ModuleNotFoundError as error:
+        raise FMQMError(
+            "this Python has no bpy: run `make demo` once and use .venv/bin/python, or run under Blender itself: "
+            "blender -b -q --python scripts/score.py -- ..."
+        ) from error
+    except ImportError as error:
+        raise FMQMError(
+            f"bpy lacks a system library ({error}); on Debian or Ubuntu: apt-get install {SYSTEM_PACKAGES}"
+        ) from error
+
+
+def take_stdout() -> TextIO:
+    """Standard output for this script alone.
+
+    Importers print to it from C, some of it only when the process ends: from here on that goes nowhere.
+    """
+    sys.stdout.flush()
+    out = open(os.dup(1), "w", encoding="utf-8", errors="backslashreplace", newline="")  # noqa: SIM115
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 1)
+    os.close(nowhere)
+    return out

@@ -1,0 +1,18 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The one family of exceptions that callers are meant to catch."""
+
+
+class FMQMError(Exception):
+    """Something given cannot be measured; the text names it and says what is wanted."""
+
+
+class SettingsError(FMQMError):
+    """A setting has a value that the metric does not accept."""
+
+
+class MeshError(FMQMError):
+    """A mesh, material or image cannot be measured."""
+
+
+class FileError(FMQMError):
+    """A file cannot be read or written."""

@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""SDF (III-B) and NCF (IV-A) of one surface at given points."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .spatial import Floats, Ints, closest_on_triangles
+from .surface import Surface
+
+# Below the resolution of a float32 tree in a box of diagonal 1, p - p_n has no direction: p = p_n.
+ON_SURFACE = 1e-9
+# A ray goes on this far behind a hit, some float32 steps, so as not to find the same place again.
+RAY_STEP = 1e-6
+# Upper bounds get this much, relative and absolute, for the float32 arithmetic of a tree.
+BOUND_SLACK, BOUND_MARGIN = 1e-4, 1e-6
+# Every so many-th point is looked up first; its triangle bounds the distance of the points after it.
+_STRIDES = (64, 8, 1)
+_BATCH = 4096
+
+
+@dataclass(frozen=True)
+class Fields:
+    """Field values of one surface at N points, in the order of the points.
+
+    Attributes:
+        nearest: (N, 3) float64 nearest surface point p_n, metric's frame.
+        triangle: (N,) int64 the triangle it lies on.
+        sdf: (N,) float64, negative inside, in units of the frame.
+        ncf: (N, 3) float32 sRGB in [0, 1].
+    """
+
+    nearest: Floats
+    triangle: Ints
+    sdf: Floats
+    ncf: NDArray[np.float32]
+
+
+def evaluate_fields(
+    surface: Surface, points: Floats, order: Ints, reach: Floats | None = None
+) -> Generator[float, None, Fields]:
+    """Equations (3), (4) and (7) at the points; yields the share done.
+
+    Args:
+        points: (N, 3) in the metric's frame.
+        order: (N,) an order in which neighbours are near in space.
+        reach: (N,) upper bounds of the distances, where known; None finds its own.
+
+    The tree says which triangle is nearest and what a ray hits; where on the triangle, and how far, is
+    computed here in float64.
+    """
+    triangle = np.empty(len(points), np.int64)
+    rounds = [order] if reach is not None else _coarse_to_fine(order)
+    looked_up = 0
+    for index, chosen in enumerate(rounds):
+        if reach is not None:
+            bounds = reach[chosen]
+        elif index == 0:
+            bounds = np.full(len(chosen), np.inf)
+        else:
+            bounds = np.linalg.norm(
+                points[chosen] - _closest(surface, points[chosen], triangle[_guide(order, index)])[0], axis=1
+            )
+        bounds = bounds * (1 + BOUND_SLACK) + BOUND_MARGIN
+        for first in range(0, len(chosen), _BATCH):
+            batch = chosen[first : first + _BATCH]
+            triangle[batch] = surface.query.nearest(points[batch], bounds[first : first + _BATCH])
+            looked_up += len(batch)
+            yield 0.35 * looked_up / len(points)
+
+    nearest, weights = _closest(surface, points, triangle)
+    away = points - nearest
+    distance = np.linalg.norm(away, axis=1)
+    on_surface = distance <= ON_SURFACE
+    nearest[on_surface] = points[on_surface]
+    distance[on_surface] = 0.0
+    ncf = surface.color_at(triangle, weights).astype(np.float32)
+    yield 0.4
+
+    off_surface = order[~on_surface[order]]
+    directions = away[off_surface] / distance[off_surface, None]
+    crossings = np.empty(len(off_surface), np.int64)
+    for first in range(0, len(off_surface), _BATCH):
+        rays = slice(first, first + _BATCH)
+        crossings[rays] = count_crossings(surface, points[off_surface[rays]], directions[rays])
+        yield 0.4 + 0.6 * min(first + _BATCH, len(off_surface)) / len(off_surface)
+    sdf = distance
+    sdf[off_surface[crossings % 2 == 1]] *= -1
+    return Fields(nearest, triangle, sdf, ncf)
+
+
+def count_crossings(surface: Surface, origins: Floats, directions: Floats) -> Ints:
+    """(N,) how often the rays cross the surface; odd is inside (III-B).
+
+    A ray crosses a triangle once: when the tree finds the last triangle again, rounding held the ray
+    back, and it takes a longer step instead of counting.
+    """
+    count = np.zeros(len(origins), np.int64)
+    last = np.full(len(origins), -1)
+    step = np.full(len(origins), RAY_STEP)
+    travelled = np.zeros(len(origins))
+    rays = np.arange(len(origins))
+    while rays.size:
+        here = origins[rays] + travelled[rays, None] * directions[rays]
+        triangle, distance = surface.query.first_hit(here, directions[rays])
+        hit = triangle >= 0
+        rays, triangle, distance = rays[hit], triangle[hit], distance[hit]
+        again = triangle == last[rays]
+        count[rays] += ~again
+        step[rays] = np.where(again, 2 * step[rays], RAY_STEP)
+        last[rays] = triangle
+        travelled[rays] += distance + step[rays]
+    return count
+
+
+def _coarse_to_fine(order: Ints) -> list[Ints]:
+    """The order in rounds: every 64th, the rest of every 8th, the rest."""
+    place = np.arange(len(order))
+    rounds = []
+    done = np.zeros(len(order), bool)
+    for stride in _STRIDES:
+        now = (place % stride == 0) & ~done
+        done |= now
+        rounds.append(order[now])
+    return rounds
+
+
+def _guide(order: Ints, index: int) -> Ints:
+    """For each point of a round, the point of the round before it that comes just before in the order."""
+    place = np.arange(len(order))
+    before, stride = _STRIDES[index - 1], _STRIDES[index]
+    now = (place % stride == 0) & (place % before != 0)
+    return order[place[now] // before * before]
+
+
+def _closest(surface: Surface, points: Floats, triangle: Ints) -> tuple[Floats, Floats]:
+    a, b, c = (surface.vertices[surface.triangles[triangle, k]] for k in range(3))
+    return closest_on_triangles(points, a, b, c)

@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Local patches of the reference (V-B): centres, ring growth, and the rules for coarse and loose meshes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .settings import Settings
+from .spatial import Floats, Ints, dot, morton_order
+from .surface import Surface, triangle_areas
+
+FPS_TIE = 1e-5  # V-B: distances this close, relatively, are equal; the lowest vertex index wins
+SPLIT_BELOW = 4  # V-B: once split, no triangle is above S_global / (SPLIT_BELOW n_patches)
+AREA_ROUNDING = 1e-9  # relative: an area that reaches its target up to rounding has reached it
+
+_FPS_BLOCK = 256  # vertices that share a bounding box in farthest point sampling
+_RANDOM_CENTERS_STREAM = 1  # keeps this random stream apart from the patches' own
+
+
+@dataclass(frozen=True)
+class PatchMesh:
+    """The reference as patches see it: same surface, triangles small enough for patches to grow evenly.
+
+    Attributes:
+        vertices: (V, 3), metric's frame. triangles: (T, 3) into vertices. areas: (T,).
+        parent: (T,) the triangle of the Surface that each one was cut from, or is.
+        was_split: triangles were cut.
+    """
+
+    vertices: Floats
+    triangles: Ints
+    areas: Floats
+    parent: Ints
+    was_split: bool
+
+    @property
+    def area(self) -> float:
+        """S_global."""
+        return float(self.areas.sum())
+
+
+@dataclass(frozen=True)
+class Patch:
+    """One local patch.
+
+    Attributes:
+        center: vertex index in the PatchMesh.
+        faces: ascending triangle indices in the PatchMesh.
+        area: S_local. diagonal: L, of the bounding box of the patch's vertices.
+        extended: its neighbours ran out, and it went on with the nearest triangles.
+    """
+
+    center: int
+    faces: Ints
+    area: float
+    diagonal: float
+    extended: bool
+
+
+def build_patch_mesh(surface: Surface, n_patches: int) -> PatchMesh:
+    """Triangles of the reference, with the edges of large ones split where one patch would be too coarse.
+
+    If any triangle is larger than S_global / n_patches, the edges of all above S_global / (4 n_patches)
+    are halved until none is; otherwise nothing changes.
+    """
+    vertices, triangles = surface.vertices, surface.triangles
+    parent = np.arange(len(triangles))
+    areas = triangle_areas(vertices, triangles)
+    target = float(areas.sum()) / n_patches
+    was_split = bool(areas.max() > target * (1 + AREA_ROUNDING))
+    if was_split:
+        limit = target / SPLIT_BELOW * (1 + AREA_ROUNDING)
+        while (areas > limit).any():
+            vertices, triangles, cut_from = split_edges(vertices, triangles, areas > limit)
+            parent = parent[cut_from]
+            areas = triangle_areas(vertices, triangles)
+    return PatchMesh(vertices, triangles, areas, parent, was_split)
+
+
+def split_edges(vertices: Floats, triangles: Ints, large: NDArray[np.bool_]) -> tuple[Floats, Ints, Ints]:
+    """Halve all edges of the large triangles; their neighbours are cut along the same new vertices.
+
+    Returns:
+        The new vertices and triangles, and for each new triangle the row of the one it was cut from, or was.
+    """
+    first, second = triangles, np.roll(triangles, -1, axis=1)  # edge k joins corners k and k + 1
+    keys = np.minimum(first, second) * len(vertices) + np.maximum(first, second)
+    split_keys = np.unique(keys[large])
+    place = np.searchsorted(split_keys, keys).clip(max=len(split_keys) - 1)
+    halved = split_keys[place] == keys
+    middle = len(vertices) + place
+    ends = np.stack([split_keys // len(vertices), split_keys % len(vertices)], axis=1)
+    vertices = np.concatenate([vertices, vertices[ends].mean(axis=1)])
+
+    count = halved.sum(axis=1)
+    whole = np.flatnonzero(count == 0)
+    pieces, cut_from = [triangles[whole]], [whole]
+    for n in (1, 2, 3):
+        rows = np.flatnonzero(count == n)
+        # Turn each triangle so that its halved edges come first; for three any turn will do.
+        if n == 3:
+            turn = np.zeros(len(rows), np.int64)
+        elif n == 1:
+            turn = halved[rows].argmax(axis=1)
+        else:
+            turn = (halved[rows].argmin(axis=1) + 1) % 3
+        corners = (turn[:, None] + np.arange(3)) % 3
+        a, b, c = triangles[rows[:, None], corners].T
+        ab, bc, ca = middle[rows[:, None], corners].T
+        if n == 1:
+            parts = [(a, ab, c), (ab, b, c)]
+        elif n == 2:
+            parts = [(a, ab, c), (ab, bc, c), (ab, b, bc)]
+        else:
+            parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+        pieces += [np.stack(part, axis=1) for part in parts]
+        cut_from += [rows] * len(parts)
+    return vertices, np.concatenate(pieces), np.concatenate(cut_from)
+
+
+def choose_centers(vertices: Floats, settings: Settings) -> Ints:
+    """(P,) vertex indices of the scored patches' centres, in their order; every vertex if there are fewer."""
+    count = min(settings.patches, len(vertices))
+    scored = count if settings.scored_patches is None else min(settings.scored_patches, count)
+    if settings.centers == "random":
+        rng = np.random.default_rng([_RANDOM_CENTERS_STREAM, settings.seed])
+        return rng.choice(len(vertices), count, replace=False)[:scored]
+    return farthest_points(vertices, scored)
+
+
+def farthest_points(vertices: Floats, count: int) -> Ints:
+    """Farthest point sampling (V-B), deterministic: starts at the vertex farthest from the mean.
+
+    Vertices lie in blocks along a space-filling curve; a new centre touches only blocks whose box it
+    could bring nearer, so that the cost hardly grows with the number of centres.
+    """
+    order = morton_order(vertices)
+    padding = -len(order) % _FPS_BLOCK
+    order = np.concatenate([order, np.full(padding, order[-1])]).reshape(-1, _FPS_BLOCK)
+    points = vertices[order]  # (blocks, _FPS_BLOCK, 3)
+    low, high = points.min(axis=1), points.max(axis=1)
+
+    def farthest(squared: Floats, block_max: Floats) -> int:
+        tie = block_max.max() * (1 - FPS_TIE) ** 2
+        blocks = np.flatnonzero(block_max >= tie)
+        return int(order[blocks][squared[blocks] >= tie].min())
+
+    from_mean = ((points - vertices.mean(axis=0)) ** 2).sum(axis=2)
+    centers = [farthest(from_mean, from_mean.max(axis=1))]
+    squared = np.full(order.shape, np.inf)
+    block_max = np.full(len(order), np.inf)
+    while len(centers) < count:
+        center = vertices[centers[-1]]
+        gap = np.maximum(np.maximum(low - center, center - high), 0)
+        touched = np.flatnonzero((gap * gap).sum(axis=1) < block_max)
+        offset = points[touched] - center
+        squared[touched] = np.minimum(squared[touched], np.einsum("bpc,bpc->bp", offset, offset))
+        block_max[touched] = squared[touched].max(axis=1)
+        centers.append(farthest(squared, block_max))
+    return np.array(centers)
+
+
+def grow_patches(mesh: PatchMesh, centers: Ints, n_patches: int) -> Iterator[Patch]:
+    """One patch a centre: its one-ring, then whole rings while S_local < S_global / n_patches.
+
+    A patch whose neighbours run out goes on with the triangles not yet in it, nearest centroid to the
+    centre first.
+    """
+    incident, start = _incident_faces(mesh)
+    seen_face = np.full(len(mesh.triangles), -1)
+    seen_vertex = np.full(len(mesh.vertices), -1)
+    centroids: Floats | None = None
+    target = mesh.area / n_patches * (1 - AREA_ROUNDING)
+    for number, center in enumerate(centers.tolist()):
+        rings: list[Ints] = []
+        area = 0.0
+        frontier = np.array([center])
+        seen_vertex[center] = number
+        while area < target and frontier.size:
+            faces = _gather(incident, start, frontier)
+            faces = np.unique(faces[seen_face[faces] != number])
+            seen_face[faces] = number
+            rings.append(faces)
+            area += float(mesh.areas[faces].sum())
+            around = mesh.triangles[faces].ravel()
+            frontier = np.unique(around[seen_vertex[around] != number])
+            seen_vertex[frontier] = number
+        extended = area < target
+        if extended:
+            if centroids is None:
+                centroids = mesh.vertices[mesh.triangles].mean(axis=1)
+            rest = np.flatnonzero(seen_face != number)
+            rings.append(_nearest_faces(centroids[rest], mesh.vertices[center], mesh.areas[rest], target - area, rest))
+        patch_faces = np.sort(np.concatenate(rings))
+        corners = mesh.vertices[mesh.triangles[patch_faces].ravel()]
+        yield Patch(
+            center=center,
+            faces=patch_faces,
+            area=float(mesh.areas[patch_faces].sum()),
+            diagonal=float(np.linalg.norm(corners.max(axis=0) - corners.min(axis=0))),
+            extended=extended,
+        )
+
+
+def _incident_faces(mesh: PatchMesh) -> tuple[Ints, Ints]:
+    """The faces around vertex v are incident[start[v] : start[v + 1]]."""
+    corners = mesh.triangles.ravel()
+    incident = np.argsort(corners, kind="stable") // 3
+    start = np.zeros(len(mesh.vertices) + 1, np.int64)
+    np.cumsum(np.bincount(corners, minlength=len(mesh.vertices)), out=start[1:])
+    return incident, start
+
+
+def _gather(values: Ints, start: Ints, rows: Ints) -> Ints:
+    """Concatenated values[start[r] : start[r + 1]] of the rows."""
+    counts = start[rows + 1] - start[rows]
+    ends = np.cumsum(counts)
+    return values[np.arange(ends[-1]) + np.repeat(start[rows] - ends + counts, counts)]
+
+
+def _nearest_faces(centroids: Floats, center: Floats, areas: Floats, wanted: float, faces: Ints) -> Ints:
+    """The nearest of the faces whose areas together reach the wanted area; all if they never do."""
+    offset = centroids - center
+    squared = dot(offset, offset)
+    few = min(64, len(squared))
+    while True:  # sort only as many of the nearest as are needed
+        near = np.argpartition(squared, few - 1)[:few]
+        near = np.flatnonzero(squared <= squared[near].max())  # with all that tie
+        near = near[np.argsort(squared[near], kind="stable")]
+        total = np.cumsum(areas[near])
+        if total[-1] >= wanted or len(near) == len(squared):
+            return faces[near[: int(np.searchsorted(total, wanted)) + 1]]
+        few = min(8 * few, len(squared))

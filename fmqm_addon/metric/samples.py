@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sample points near the reference's surface (V-C) and the color units drawn among them (V-E3)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .patches import Patch, PatchMesh
+from .settings import Settings
+from .spatial import Floats, Ints
+from .surface import triangle_normals
+
+PATCH_CAP = 1.1  # V-C: no patch takes more than this many times its even share of the samples
+COUNT_ROUNDING = 1e-9  # a count that reaches a whole number up to rounding has reached it
+
+
+@dataclass(frozen=True)
+class PatchSamples:
+    """Samples of one patch.
+
+    Attributes:
+        positions: (n, 3), metric's frame. offset: (n,) signed distance from the face it was drawn on.
+        face: (n,) that face in the PatchMesh. units: ascending indices of the drawn color units.
+    """
+
+    positions: Floats
+    offset: Floats
+    face: Ints
+    units: Ints
+
+
+def sample_count(patch: Patch, total_area: float, settings: Settings) -> int:
+    """N_local = floor(S_local / S_global N_target), at most floor(1.1 N_target / N_patch)."""
+    share = patch.area / total_area * settings.samples
+    cap = PATCH_CAP * settings.samples / settings.patches
+    return int(np.floor(min(share, cap) + COUNT_ROUNDING))
+
+
+def draw_samples(mesh: PatchMesh, patch: Patch, total_area: float, settings: Settings) -> PatchSamples:
+    """Samples of a patch: they depend on the seed, the settings and this patch alone.
+
+    Face f gets N_f = S_f / S_local N_local samples, floor or ceiling, by systematic resampling; uniform
+    barycentric coordinates; offsets along the face normal from N(0, (sigma L)^2).
+    """
+    rng = np.random.default_rng([settings.seed, patch.center])
+    count = sample_count(patch, total_area, settings)
+    expected = np.cumsum(mesh.areas[patch.faces])
+    expected *= count / expected[-1]
+    expected[-1] = count
+    upto = np.floor(expected + rng.random()).astype(np.int64)
+    face = np.repeat(patch.faces, np.diff(upto, prepend=0))
+
+    root, second = np.sqrt(rng.random(count)), rng.random(count)
+    weights = np.stack([1 - root, root * (1 - second), root * second], axis=1)
+    offset = rng.normal(0.0, settings.sigma * patch.diagonal, count)
+    corners = mesh.triangles[face]
+    positions = np.einsum("nk,nkc->nc", weights, mesh.vertices[corners])
+    positions += offset[:, None] * triangle_normals(mesh.vertices, corners)
+    units = np.sort(rng.choice(count, min(settings.color_units, count), replace=False))
+    return PatchSamples(positions, offset, face, units)
+
+
+@dataclass(frozen=True)
+class Samples:
+    """All samples, patch after patch.
+
+    Attributes:
+        positions: (N, 3) float64, metric's frame. offset: (N,) as in PatchSamples.
+        patch: (N,) int32 row of the patch. start: (P + 1,) patch k is start[k] : start[k + 1].
+        unit: (N,) bool, the drawn color units.
+    """
+
+    positions: Floats
+    offset: Floats
+    patch: NDArray[np.int32]
+    start: Ints
+    unit: NDArray[np.bool_]
+
+
+def join_samples(parts: list[PatchSamples]) -> Samples:
+    counts = np.array([len(part.positions) for part in parts])
+    start = np.concatenate([[0], np.cumsum(counts)])
+    unit = np.zeros(start[-1], bool)
+    for part, first in zip(parts, start.tolist(), strict=False):
+        unit[first + part.units] = True
+    return Samples(
+        positions=np.concatenate([part.positions for part in parts]),
+        offset=np.concatenate([part.offset for part in parts]),
+        patch=np.repeat(np.arange(len(parts), dtype=np.int32), counts),
+        start=start,
+        unit=unit,
+    )

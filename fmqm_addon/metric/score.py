@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The score of a distorted surface against its reference, computed in small steps.
+
+    evaluation = Evaluation(reference, settings)
+    evaluation.prepare().run()
+    result = evaluation.compare(distorted).run()
+
+One preparation serves any number of comparisons, all on the same samples.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .color import channel_weights, channels
+from .errors import MeshError
+from .features import PatchField, patch_features, pool_features
+from .fields import Fields, evaluate_fields
+from .patches import Patch, PatchMesh, build_patch_mesh, choose_centers, grow_patches
+from .samples import Samples, draw_samples, join_samples
+from .settings import Settings
+from .spatial import Floats, Ints, morton_order
+from .surface import Frame, Surface
+
+COLUMNS = ("geoSSIM", "geoGraSSIM", "colorSSIM", "colorGraSSIM", "FMQM")
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Progress:
+    """What a step has worked on, and the share of the whole stepper that is done, in [0, 1]."""
+
+    stage: str
+    done: float
+
+
+Work = Generator[Progress, None, T]
+
+
+class Stepper(Generic[T]):
+    """Work in steps of some milliseconds: for a loop, a progress bar or a timer alike.
+
+    Attributes:
+        progress: where the work is. seconds: time spent, by stage. result: there once step() is False.
+    """
+
+    def __init__(self, work: Work[T]) -> None:
+        self._work = work
+        self.progress = Progress("", 0.0)
+        self.seconds: dict[str, float] = {}
+        self.result: T
+
+    def step(self) -> bool:
+        """Do a little; True while there is more to do."""
+        began = time.perf_counter()
+        more = True
+        try:
+            self.progress = next(self._work)
+        except StopIteration as end:
+            self.result = end.value
+            more = False
+        stage = self.progress.stage
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - began
+        return more
+
+    def run(self) -> T:
+        while self.step():
+            pass
+        return self.result
+
+    def cancel(self) -> None:
+        self._work.close()
+
+
+@dataclass(frozen=True)
+class Result:
+    """A comparison.
+
+    Attributes:
+        scores: (5,) float64 means over the patches, in the order of COLUMNS.
+        patch_scores: (P, 5) float64, the same order.
+        patch_mesh: the reference as the patches see it; their faces are its triangles.
+        patches: the P patches, on patch_mesh. patch_centers: (P, 3) metric's frame.
+        samples: N sample points. ref, dist: the fields of both surfaces there; metric's frame.
+        frame: from the metric's frame to the reference's world.
+        warnings: what should be known before the scores are believed.
+    """
+
+    settings: Settings
+    scores: Floats
+    patch_scores: Floats
+    patch_mesh: PatchMesh
+    patches: tuple[Patch, ...]
+    patch_centers: Floats
+    samples: Samples
+    ref: Fields
+    dist: Fields
+    frame: Frame
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Prepared:
+    patch_mesh: PatchMesh
+    patches: tuple[Patch, ...]
+    patch_centers: Floats
+    samples: Samples
+    order: Ints
+    ref: Fields
+    warnings: tuple[str, ...]
+
+
+class Evaluation:
+    """A reference with its patches, samples and field values."""
+
+    def __init__(self, reference: Surface, settings: Settings) -> None:
+        self.reference = reference
+        self.settings = settings
+        self._prepared: _Prepared | None = None
+
+    def prepare(self) -> Stepper[None]:
+        """Patches, samples and the reference's fields; once, before comparing."""
+        return Stepper(self._prepare())
+
+    def compare(self, distorted: Surface) -> Stepper[Result]:
+        """Scores of a surface that was prepared in the reference's frame."""
+        if self._prepared is None:
+            raise RuntimeError("prepare() must have run to its end before compare()")
+        if distorted.frame is not self.reference.frame:
+            raise ValueError("the distorted surface must be prepared in the reference's frame")
+        return Stepper(self._compare(self._prepared, distorted))
+
+    def _prepare(self) -> Work[None]:
+        settings = self.settings
+        mesh = build_patch_mesh(self.reference, settings.patches)
+        yield Progress("prepare", 0.05)
+        centers = choose_centers(mesh.vertices, settings)
+        yield Progress("prepare", 0.1)
+        patches, parts = [], []
+        total_area = mesh.area
+        for patch in grow_patches(mesh, centers, settings.patches):
+            patches.append(patch)
+            parts.append(draw_samples(mesh, patch, total_area, settings))
+            yield Progress("prepare", 0.1 + 0.3 * len(patches) / len(centers))
+        samples = join_samples(parts)
+        if not len(samples.positions):
+            raise MeshError(f"{self.reference.name}: no samples fall on its patches")
+        order = morton_order(samples.positions)
+        yield Progress("prepare", 0.4)
+
+        warnings = list(self.reference.warnings)
+        if mesh.was_split:
+            warnings.append(
+                f"{self.reference.name}: triangles larger than a patch; their edges were split for the "
+                f"patches ({len(self.reference.triangles)} to {len(mesh.triangles)} triangles, same surface)"
+            )
+        extended = sum(patch.extended for patch in patches)
+        if extended:
+            warnings.append(
+                f"{self.reference.name}: {extended} of {len(patches)} patches ran out of neighbors and went on "
+                "with the nearest triangles (loose parts)"
+            )
+        reach = np.abs(samples.offset)  # a sample is this near to the face it was drawn on
+        ref = yield from _evaluate(self.reference, samples, order, reach, 0.4, 1.0)
+        self._prepared = _Prepared(mesh, tuple(patches), mesh.vertices[centers], samples, order, ref, tuple(warnings))
+
+    def _compare(self, prepared: _Prepared, distorted: Surface) -> Work[Result]:
+        settings, samples = self.settings, prepared.samples
+        dist = yield from _evaluate(distorted, samples, prepared.order, None, 0.0, 0.8)
+        weights = channel_weights(settings.color_space)
+        channels_r, channels_d = (channels(field.ncf, settings.color_space) for field in (prepared.ref, dist))
+        features = np.empty((len(prepared.patches), 4))
+        for k, patch in enumerate(prepared.patches):
+            here = slice(samples.start[k], samples.start[k + 1])
+            features[k] = patch_features(
+                samples.positions[here] / patch.diagonal,
+                _patch_field(prepared.ref, channels_r, here, patch.diagonal),
+                _patch_field(dist, channels_d, here, patch.diagonal),
+                np.flatnonzero(samples.unit[here]),
+                weights,
+                settings,
+            )
+            yield Progress("features", 0.8 + 0.2 * (k + 1) / len(prepared.patches))
+        patch_scores = np.column_stack([features, pool_features(features, settings.pooling)])
+        return Result(
+            settings=settings,
+            scores=patch_scores.mean(axis=0),
+            patch_scores=patch_scores,
+            patch_mesh=prepared.patch_mesh,
+            patches=prepared.patches,
+            patch_centers=prepared.patch_centers,
+            samples=samples,
+            ref=prepared.ref,
+            dist=dist,
+            frame=self.reference.frame,
+            warnings=prepared.warnings + tuple(w for w in distorted.warnings if w not in prepared.warnings),
+        )
+
+
+def _evaluate(
+    surface: Surface, samples: Samples, order: Ints, reach: NDArray[np.float64] | None, first: float, last: float
+) -> Work[Fields]:
+    work = evaluate_fields(surface, samples.positions, order, reach)
+    while True:
+        try:
+            done = next(work)
+        except StopIteration as end:
+            fields: Fields = end.value
+            return fields
+        yield Progress("fields", first + (last - first) * done)
+
+
+def _patch_field(fields: Fields, values: Floats, here: slice, diagonal: float) -> PatchField:
+    return PatchField(fields.nearest[here] / diagonal, fields.sdf[here] / diagonal, values[here])

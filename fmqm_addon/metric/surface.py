@@ -1,0 +1,217 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A mesh as the metric sees it: welded triangles in one frame, corner UVs, colors, and its spatial query."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .color import Color
+from .errors import MeshError
+from .spatial import Floats, Ints, cross, dot
+
+# Heights of triangles below this many float64 roundings of the position count as zero area.
+FLAT_ROUNDINGS = 8
+
+
+@dataclass(frozen=True)
+class MeshArrays:
+    """A mesh as an adapter delivers it; nothing is assumed about its quality.
+
+    Attributes:
+        name: what messages call it.
+        positions: (V, 3) float64, world frame, scene units.
+        triangles: (T, 3) integers into positions.
+        uv: (T, 3, 2) float texture coordinates of the corners.
+        material: (T,) integers into colors.
+        colors: what each material looks like.
+        warnings: what the adapter had to leave out or assume.
+    """
+
+    name: str
+    positions: Floats
+    triangles: NDArray[Any]
+    uv: NDArray[Any]
+    material: NDArray[Any]
+    colors: tuple[Color, ...]
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Scene units to the metric's own: (position - center) / scale. Scale is the reference's box diagonal."""
+
+    center: Floats
+    scale: float
+
+    def enter(self, world: Floats) -> Floats:
+        return (world - self.center) / self.scale
+
+    def leave(self, positions: Floats) -> Floats:
+        return positions * self.scale + self.center
+
+
+class SurfaceQuery(Protocol):
+    """What a spatial index of a surface must answer; positions are in the metric's frame, (N, 3) float64."""
+
+    def nearest(self, points: Floats, bounds: Floats | None) -> Ints:
+        """(N,) index of the triangle nearest to each point; bounds (N,) are upper bounds of the distances."""
+
+    def first_hit(self, origins: Floats, directions: Floats) -> tuple[Ints, Floats]:
+        """(N,) first triangle on each ray, -1 for none, and (N,) distance to it; directions have unit length."""
+
+
+QueryBuilder = Callable[[Floats, Ints], SurfaceQuery]
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A prepared surface (METRIC "Preparing the two surfaces").
+
+    Attributes:
+        vertices: (V, 3) float64 in the metric's frame; no two are equal, each is used.
+        triangles: (T, 3) int64; none is degenerate, none repeats another.
+        uv: (T, 3, 2) float64; material: (T,) int64; colors: as in MeshArrays.
+        source: (T,) int64, the row of each triangle in MeshArrays.
+    """
+
+    name: str
+    frame: Frame
+    vertices: Floats
+    triangles: Ints
+    uv: Floats
+    material: Ints
+    colors: tuple[Color, ...]
+    source: Ints
+    query: SurfaceQuery
+    warnings: tuple[str, ...]
+
+    def color_at(self, triangle: Ints, barycentric: Floats) -> Floats:
+        """Equations (5) to (7): (N, 3) float64 sRGB colors at barycentric (N, 3) places of (N,) triangles."""
+        uv = np.einsum("nk,nkc->nc", barycentric, self.uv[triangle])
+        if len(self.colors) == 1:
+            return self.colors[0].lookup(uv)
+        material = self.material[triangle]
+        result = np.empty((len(uv), 3))
+        for index, color in enumerate(self.colors):
+            here = np.flatnonzero(material == index)
+            if here.size:
+                result[here] = color.lookup(uv[here])
+        return result
+
+
+def prepare_surface(mesh: MeshArrays, build_query: QueryBuilder, frame: Frame | None = None) -> Surface:
+    """Weld, drop what cannot be measured, move to the metric's frame, index.
+
+    Args:
+        frame: the reference's; None makes the frame from this mesh, which is then the reference.
+
+    Raises:
+        MeshError: no usable triangle is left.
+    """
+    warnings = list(mesh.warnings)
+    triangles = np.asarray(mesh.triangles, np.int64).reshape(-1, 3)
+    if not len(triangles):
+        raise MeshError(f"{mesh.name}: the mesh has no faces; a surface is wanted")
+    source = np.arange(len(triangles))
+
+    def keep(mask: NDArray[np.bool_], why: str) -> None:
+        nonlocal triangles, source
+        dropped = len(mask) - np.count_nonzero(mask)
+        if not dropped:
+            return
+        if dropped == len(mask):
+            raise MeshError(f"{mesh.name}: all {len(mesh.triangles)} triangles are unusable; the last {dropped} {why}")
+        warnings.append(f"{mesh.name}: {dropped} of {len(mesh.triangles)} triangles left out: they {why}")
+        triangles, source = triangles[mask], source[mask]
+
+    finite = np.isfinite(mesh.positions).all(axis=1)
+    keep(finite[triangles].all(axis=1), "have coordinates that are not finite")
+    positions, triangles = weld(np.where(finite[:, None], mesh.positions, 0.0), triangles)
+    keep(~_is_flat(positions, triangles), "have zero area")
+    keep(_is_first(triangles), "repeat another triangle")
+
+    used, compact = np.unique(triangles, return_inverse=True)
+    positions, triangles = positions[used], compact.reshape(-1, 3)
+    if frame is None:
+        low, high = positions.min(axis=0), positions.max(axis=0)
+        frame = Frame(low + (high - low) / 2, float(np.linalg.norm(high - low)))
+    vertices = frame.enter(positions)
+    uv = np.asarray(mesh.uv, np.float64)[source]
+    return Surface(
+        name=mesh.name,
+        frame=frame,
+        vertices=vertices,
+        triangles=triangles,
+        uv=uv,
+        material=np.asarray(mesh.material, np.int64)[source],
+        colors=mesh.colors,
+        source=source,
+        query=build_query(vertices, triangles),
+        warnings=tuple(warnings),
+    )
+
+
+def weld(positions: Floats, triangles: Ints) -> tuple[Floats, Ints]:
+    """Vertices at equal positions become one.
+
+    The welded vertices are numbered by position (x, then y, then z), so that what depends on vertex
+    numbers, such as ties in farthest point sampling, does not depend on the order in a file.
+    """
+    order = np.lexsort(positions.T[::-1])
+    ordered = positions[order]
+    new = np.ones(len(order), bool)
+    new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    which = np.empty(len(order), np.int64)
+    which[order] = np.cumsum(new) - 1
+    return ordered[new], which[triangles]
+
+
+def triangle_areas(vertices: Floats, triangles: Ints) -> Floats:
+    return np.linalg.norm(_area_vectors(vertices, triangles), axis=1) / 2
+
+
+def triangle_normals(vertices: Floats, triangles: Ints) -> Floats:
+    """(T, 3) unit normals; the triangles must not be degenerate."""
+    normals = _area_vectors(vertices, triangles)
+    return normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
+def _area_vectors(vertices: Floats, triangles: Ints) -> Floats:
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    return cross(b - a, c - a)
+
+
+def _is_flat(positions: Floats, triangles: Ints) -> NDArray[np.bool_]:
+    """Zero area, up to the rounding that the positions already carry."""
+    a, b, c = (positions[triangles[:, k]] for k in range(3))
+    ab, ac, bc = b - a, c - a, c - b
+    longest = np.sqrt(np.maximum(np.maximum(dot(ab, ab), dot(ac, ac)), dot(bc, bc)))
+    reach = np.abs(positions).max(axis=1)[triangles].max(axis=1)
+    height_times_longest = np.linalg.norm(cross(ab, ac), axis=1)
+    rounding = FLAT_ROUNDINGS * np.finfo(np.float64).eps * reach
+    welded_away = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)
+    return welded_away | (height_times_longest <= rounding * longest)
+
+
+def _is_first(triangles: Ints) -> NDArray[np.bool_]:
+    """False where an earlier triangle has the same three vertices in any order.
+
+    Sorting one 64-bit mix of the three is several times faster than sorting rows; where two different
+    rows share it, the rows themselves are sorted.
+    """
+    rows = np.sort(triangles, axis=1)
+    mix = np.zeros(len(rows), np.uint64)
+    for column in rows.view(np.uint64).T:
+        mix = (mix ^ column) * np.uint64(0x9E3779B97F4A7C15)
+        mix ^= mix >> np.uint64(29)
+    _, first, which = np.unique(mix, return_index=True, return_inverse=True)
+    if not np.array_equal(rows[first][which], rows):
+        _, first, which = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+        which = which.reshape(-1)
+    is_first: NDArray[np.bool_] = first[which] == np.arange(len(rows))
+    return is_first

@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Samples, fields and patch scores of one comparison as an NPZ file."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+
+from ..metric.score import Result
+from .files import replaced
+
+
+def save_fields(path: str, result: Result) -> None:
+    """Writes the arrays that the scores were computed from.
+
+    position, ref_nearest, dist_nearest (N, 3) f8, the reference's world frame; ref_sdf, dist_sdf (N,) f8,
+    scene units, negative inside; ref_ncf, dist_ncf (N, 3) f4 in [0, 1]; patch (N,) i4, row of the P
+    arrays; unit (N,) bool, the drawn color units; patch_center (P, 3), patch_diagonal, patch_area (P,)
+    f8; patch_scores (P, 5) f8: geoSSIM, geoGraSSIM, colorSSIM, colorGraSSIM, FMQM; settings, a JSON text.
+
+    Raises:
+        FileError: the file cannot be written.
+    """
+    frame = result.frame
+    with replaced(path) as temporary:
+        np.savez(
+            temporary,
+            position=frame.leave(result.samples.positions),
+            patch=result.samples.patch,
+            unit=result.samples.unit,
+            ref_nearest=frame.leave(result.ref.nearest),
+            dist_nearest=frame.leave(result.dist.nearest),
+            ref_sdf=result.ref.sdf * frame.scale,
+            dist_sdf=result.dist.sdf * frame.scale,
+            ref_ncf=result.ref.ncf,
+            dist_ncf=result.dist.ncf,
+            patch_center=frame.leave(result.patch_centers),
+            patch_diagonal=np.array([patch.diagonal for patch in result.patches]) * frame.scale,
+            patch_area=np.array([patch.area for patch in result.patches]) * frame.scale**2,
+            patch_scores=result.patch_scores,
+            settings=np.array(json.dumps(result.settings.as_dict())),
+        )

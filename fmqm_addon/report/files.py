@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Writing files whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from ..metric.errors import FileError
+
+
+@contextmanager
+def replaced(path: str) -> Iterator[str]:
+    """A temporary path beside the file, which takes the file's place once it has been written.
+
+    Raises:
+        FileError: it cannot be written; what stood there is left as it was.
+    """
+    check_writable(path)
+    target = Path(path)
+    temporary = ""
+    try:
+        handle, temporary = tempfile.mkstemp(suffix=target.suffix, prefix=f".{target.name}.", dir=target.parent)
+        os.close(handle)
+        yield temporary
+        umask = os.umask(0)
+        os.umask(umask)
+        os.chmod(temporary, 0o666 & ~umask)
+        os.replace(temporary, path)
+    except OSError as error:
+        raise FileError(f"{path}: cannot be written ({error.strerror or error})") from error
+    finally:
+        if temporary and os.path.exists(temporary):
+            os.remove(temporary)
+
+
+def write_text(path: str, text: str) -> None:
+    with replaced(path) as temporary:
+        Path(temporary).write_text(text, encoding="utf-8", errors="backslashreplace", newline="")
+
+
+def check_writable(path: str) -> None:
+    """Says early, before minutes of work, that an output cannot be written.
+
+    Raises:
+        FileError: its folder is missing or read-only, or it is a folder.
+    """
+    folder = Path(path).parent
+    if not folder.is_dir():
+        raise FileError(f"{path}: the folder {folder} does not exist; make it first")
+    if Path(path).is_dir():
+        raise FileError(f"{path}: this is a folder; name a file")
+    if not os.access(folder, os.W_OK):
+        raise FileError(f"{path}: the folder {folder} is read-only")

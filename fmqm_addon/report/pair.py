@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Scores of pairs as JSON, CSV and a table."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..metric.score import COLUMNS
+from ..metric.spatial import Floats
+
+SHOWN = ("FMQM", *(name for name in COLUMNS if name != "FMQM"))  # the score first, then its features
+STAGES = ("load", "prepare", "fields", "features", "total")
+_INDEX = {name: COLUMNS.index(name) for name in SHOWN}
+
+
+@dataclass(frozen=True)
+class PairScore:
+    """One pair's outcome.
+
+    Attributes:
+        reference, distorted: as the user named them.
+        scores, stderr: (5,) in the order of metric.score.COLUMNS; None where there are none.
+        seconds: by STAGES; what several pairs share is counted in the first.
+        error: why there are no scores.
+    """
+
+    reference: str
+    distorted: str
+    scores: Floats | None = None
+    stderr: Floats | None = None
+    patches: int | None = None
+    samples: int | None = None
+    seconds: dict[str, float] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+    error: str | None = None
+
+    @property
+    def fmqm(self) -> float | None:
+        return None if self.scores is None else float(self.scores[_INDEX["FMQM"]])
+
+
+def json_text(pairs: Sequence[PairScore], settings: dict[str, Any], versions: dict[str, str]) -> str:
+    document = {**versions, "settings": settings, "pairs": [_pair_dict(pair) for pair in pairs]}
+    return json.dumps(document, indent=2, allow_nan=False) + "\n"
+
+
+def csv_text(pairs: Sequence[PairScore]) -> str:
+    """Numbers at full precision with a decimal point, whatever the locale; fields that failed are empty."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(["reference", "distorted", *SHOWN, "error"])
+    for pair in pairs:
+        numbers = ["" if value is None else repr(value) for value in _columns(pair.scores).values()]
+        writer.writerow([pair.reference, pair.distorted, *numbers, pair.error or ""])
+    return out.getvalue()
+
+
+def table_text(pairs: Sequence[PairScore]) -> str:
+    """An aligned table, one row a pair."""
+    rows = [["distorted", *SHOWN]]
+    for pair in pairs:
+        if pair.scores is None:
+            rows.append([pair.distorted, *["-"] * len(SHOWN)])
+            continue
+        cells = []
+        for name in SHOWN:
+            cell = f"{pair.scores[_INDEX[name]]:.4f}"
+            cells.append(cell if pair.stderr is None else f"{cell} ±{pair.stderr[_INDEX[name]]:.4f}")
+        rows.append([pair.distorted, *cells])
+    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
+    lines = []
+    for row in rows:
+        cells = [row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))]
+        lines.append("  ".join(cells).rstrip())
+    return "\n".join(lines) + "\n"
+
+
+def _pair_dict(pair: PairScore) -> dict[str, Any]:
+    return {
+        "reference": pair.reference,
+        "distorted": pair.distorted,
+        **_columns(pair.scores),
+        "stderr": None if pair.stderr is None else _columns(pair.stderr),
+        "patches": pair.patches,
+        "samples": pair.samples,
+        "seconds": {stage: pair.seconds.get(stage, 0.0) for stage in STAGES},
+        "warnings": list(pair.warnings),
+        "error": pair.error,
+    }
+
+
+def _columns(values: Floats | None) -> dict[str, float | None]:
+    if values is None:
+        return dict.fromkeys(SHOWN)
+    numbers = np.asarray(values, np.float64).tolist()
+    return {name: numbers[_INDEX[name]] for name in SHOWN}

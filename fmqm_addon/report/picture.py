@@ -1,0 +1,380 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pictures of what was compared, drawn by casting camera rays through the surfaces' own spatial queries.
+
+A pixel's color comes from the same lookup as the color field (NCF), times a headlight's shade. No
+renderer and no graphics card take part. Only writing a PNG needs Pillow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..metric.color import srgb_to_lab
+from ..metric.errors import FMQMError
+from ..metric.score import COLUMNS, Result
+from ..metric.spatial import Floats, Ints, closest_on_triangles, dot
+from ..metric.surface import Surface, triangle_normals
+from .files import replaced
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+    from PIL.ImageDraw import ImageDraw
+
+Pixels = NDArray[np.uint8]
+
+BACKGROUND = (236, 237, 239)  # light grey: stands on white pages and on dark ones
+INK, FAINT_INK, RULE = (32, 34, 38), (84, 88, 96), (150, 153, 158)
+NO_PATCH = (0.62, 0.63, 0.65)  # encoded color of a face that no scored patch covers
+
+# Encoded colors from score 0 to score 1: bad is hot and bright, good is dark (inferno without its ends).
+SCORE_COLORS = ("#f9dd4c", "#fbb418", "#f8850f", "#e65d2f", "#cb4149", "#a62c60", "#7f1e6c", "#56106e", "#280b54")
+
+# The camera looks from the front right, a little from above; Blender's front is -Y, and Z is up.
+AZIMUTH, ELEVATION = 32.0, 16.0  # degrees
+FIELD_OF_VIEW = 20.0  # degrees, of the longer side
+MARGIN = 1.06  # the frame is this much larger than what it holds
+ASPECTS = (0.7, 1.4)  # panels are as high as this many widths at least and at most
+
+AMBIENT, SCORE_AMBIENT = 0.5, 0.65  # shade of a face edge-on; colors that mean numbers are shaded less
+LIGHT = (-0.45, 0.55, 1.0)  # direction to the headlight: right, up, towards the camera
+CONTRAST = 0.16  # pixels that differ this much from a neighbor get more rays
+MORE_RAYS = np.array([(-1, -3), (3, -1), (1, 3), (-3, 1)]) / 8  # a turned square: no two in a row or column
+BATCH = 1 << 16  # rays per query
+
+WIDTH = 1500  # pixels; the lengths and type sizes below are for a picture this wide
+GAP, BAR_WIDTH, BAR_SPACE, HEAD, FOOT = 24, 22, 86, 64, 60
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A perspective camera in the metric's frame.
+
+    Attributes:
+        eye: (3,) where it stands. axes: (3, 3) unit rows right, up, and forward.
+        half: half the width and height of the image at distance 1.
+    """
+
+    eye: Floats
+    axes: Floats
+    half: tuple[float, float]
+
+    @classmethod
+    def framing(
+        cls, *surfaces: Surface, aspect: float = 1.0, azimuth: float = AZIMUTH, elevation: float = ELEVATION
+    ) -> Camera:
+        """The camera that just holds the surfaces, Z up.
+
+        Args:
+            aspect: height of the image by its width. azimuth: degrees from the front (-Y) towards the
+                right (+X). elevation: degrees above the horizon, less than 90 either way.
+        """
+        axes = _view_axes(azimuth, elevation)
+        half_long = float(np.tan(np.radians(FIELD_OF_VIEW / 2)))
+        half = (half_long / max(aspect, 1.0), half_long * min(aspect, 1.0))
+        points = np.concatenate([surface.vertices for surface in surfaces]) @ axes.T
+        # Each side of the frame is a plane through the eye that has all points inside.
+        eye = np.empty(3)
+        depths = []
+        for k in (0, 1):
+            slope = half[k] / MARGIN
+            above = float((points[:, k] - slope * points[:, 2]).max())
+            below = float((-points[:, k] - slope * points[:, 2]).max())
+            eye[k] = (above - below) / 2
+            depths.append(-(above + below) / (2 * slope))
+        eye[2] = min(depths)
+        return cls(eye @ axes, axes, half)
+
+    def directions(self, x: Floats, y: Floats) -> Floats:
+        """(N, 3) unit directions from the eye; x from -1 (left) to 1, y from -1 (bottom) to 1."""
+        local = np.stack([x * self.half[0], y * self.half[1], np.ones(len(x))], axis=1)
+        directions: Floats = local @ self.axes
+        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        return directions
+
+
+def _view_axes(azimuth: float, elevation: float) -> Floats:
+    a, e = np.radians(azimuth), np.radians(elevation)
+    right = [np.cos(a), np.sin(a), 0.0]
+    forward = [-np.sin(a) * np.cos(e), np.cos(a) * np.cos(e), -np.sin(e)]
+    return np.array([right, np.cross(right, forward), forward])
+
+
+def natural_aspect(*surfaces: Surface) -> float:
+    """Height by width of the surfaces as the usual camera sees them, within ASPECTS."""
+    points = np.concatenate([surface.vertices for surface in surfaces]) @ _view_axes(AZIMUTH, ELEVATION)[:2].T
+    width, height = np.maximum(points.max(axis=0) - points.min(axis=0), 1e-9)
+    return float(np.clip(height / width, *ASPECTS))
+
+
+def render(
+    surface: Surface,
+    camera: Camera,
+    size: tuple[int, int],
+    face_color: Floats | None = None,
+    hits: Ints | None = None,
+) -> Pixels:
+    """A surface as the camera sees it, from either side of its faces, on BACKGROUND.
+
+    Args:
+        size: width and height in pixels.
+        face_color: (T, 3) encoded colors in [0, 1] to show in place of the surface's own.
+        hits: what pixel_hits() says of the same surface, camera and size, to save casting them again.
+
+    Returns:
+        (height, width, 3) uint8. One ray a pixel, and more where neighbors differ.
+    """
+    if hits is None:
+        hits = pixel_hits(surface, camera, size)
+    columns, rows = _pixel_centers(size)
+    image = _ray_colors(surface, camera, _directions(camera, size, columns, rows), hits, face_color)
+    rough = np.flatnonzero(_differs(image.reshape(size[1], size[0], 3)))
+    across, down = MORE_RAYS.T
+    directions = _directions(camera, size, (columns[rough, None] + across).ravel(), (rows[rough, None] + down).ravel())
+    fine = _ray_colors(surface, camera, directions, _first_hits(surface, camera, directions), face_color)
+    image[rough] = fine.reshape(len(rough), len(MORE_RAYS), 3).mean(axis=1)
+    pixels: Pixels = (image.reshape(size[1], size[0], 3) * 255 + 0.5).astype(np.uint8)
+    return pixels
+
+
+def pixel_hits(surface: Surface, camera: Camera, size: tuple[int, int]) -> Ints:
+    """(height * width,) the triangle behind the center of each pixel, row after row; -1 for none."""
+    return _first_hits(surface, camera, _directions(camera, size, *_pixel_centers(size)))
+
+
+def _pixel_centers(size: tuple[int, int]) -> tuple[Floats, Floats]:
+    """(N,) columns and rows, in pixels from the left and the top."""
+    columns, rows = np.meshgrid(np.arange(size[0]) + 0.5, np.arange(size[1]) + 0.5)
+    return columns.ravel(), rows.ravel()
+
+
+def _directions(camera: Camera, size: tuple[int, int], columns: Floats, rows: Floats) -> Floats:
+    """(N, 3) unit directions through places of the image, in pixels."""
+    return camera.directions(2 * columns / size[0] - 1, 1 - 2 * rows / size[1])
+
+
+def _first_hits(surface: Surface, camera: Camera, directions: Floats) -> Ints:
+    """(N,) the first triangle on each ray from the camera, -1 for none."""
+    triangle = np.empty(len(directions), np.int64)
+    for first in range(0, len(directions), BATCH):  # a query makes Python objects of its rays
+        here = slice(first, first + BATCH)
+        origins = np.broadcast_to(camera.eye, directions[here].shape)
+        triangle[here] = surface.query.first_hit(origins, directions[here])[0]
+    return triangle
+
+
+def _ray_colors(
+    surface: Surface, camera: Camera, directions: Floats, triangle: Ints, face_color: Floats | None
+) -> Floats:
+    """(N, 3) encoded colors in [0, 1] of rays from the camera that end on the (N,) triangles; -1: BACKGROUND."""
+    colors = np.empty((len(directions), 3))
+    colors[:] = np.array(BACKGROUND) / 255
+    hit = np.flatnonzero(triangle >= 0)
+    directions, triangle = directions[hit], triangle[hit]
+    a, b, c = (surface.vertices[surface.triangles[triangle, k]] for k in range(3))
+    normals = triangle_normals(surface.vertices, surface.triangles)[triangle]
+    slope = dot(normals, directions)
+    normals *= -np.sign(slope)[:, None]  # towards the camera
+    light = np.array(LIGHT) * (1, 1, -1) @ camera.axes
+    lit = np.maximum(normals @ (light / np.linalg.norm(light)), 0)
+    if face_color is not None:
+        seen, ambient = face_color[triangle], SCORE_AMBIENT
+    else:
+        distance = np.abs(dot(a - camera.eye, normals)) / np.maximum(np.abs(slope), 1e-12)
+        points = camera.eye + distance[:, None] * directions
+        seen, ambient = surface.color_at(triangle, closest_on_triangles(points, a, b, c)[1]), AMBIENT
+    colors[hit] = np.clip(seen, 0, 1) * (ambient + (1 - ambient) * lit)[:, None]
+    return colors
+
+
+def _differs(image: Floats) -> NDArray[np.bool_]:
+    """(H, W) whether a pixel has more than CONTRAST to one of its four neighbors in any channel."""
+    differs = np.zeros(image.shape[:2], bool)
+    across = (np.abs(np.diff(image, axis=1)) > CONTRAST).any(axis=2)
+    down = (np.abs(np.diff(image, axis=0)) > CONTRAST).any(axis=2)
+    differs[:, 1:] |= across
+    differs[:, :-1] |= across
+    differs[1:] |= down
+    differs[:-1] |= down
+    return differs
+
+
+def score_by_face(result: Result, surface: Surface, column: str = "FMQM") -> Floats:
+    """(T,) mean score of the patches that cover each triangle of the reference; nan where none does.
+
+    A triangle that was cut for the patches has the area-weighted mean of its covered pieces.
+
+    Args:
+        surface: the reference of the result. column: one of COLUMNS.
+    """
+    mesh = result.patch_mesh
+    total, patches = np.zeros(len(mesh.triangles)), np.zeros(len(mesh.triangles))
+    for patch, score in zip(result.patches, result.patch_scores[:, COLUMNS.index(column)].tolist(), strict=True):
+        total[patch.faces] += score
+        patches[patch.faces] += 1
+    covered = patches > 0
+    area, parent = mesh.areas[covered], mesh.parent[covered]
+    count = len(surface.triangles)
+    weighted = np.bincount(parent, area * total[covered] / patches[covered], minlength=count)
+    covered_area = np.bincount(parent, area, minlength=count)
+    scores: Floats = np.full(count, np.nan)
+    np.divide(weighted, covered_area, out=scores, where=covered_area > 0)
+    return scores
+
+
+def score_colors(scores: Floats) -> Floats:
+    """(N, 3) encoded colors in [0, 1] of scores from 0 (hot) to 1 (dark); NO_PATCH for nan."""
+    table = _score_table()
+    known = np.clip(np.nan_to_num(scores), 0, 1)
+    colors: Floats = table[np.rint(known * (len(table) - 1)).astype(np.int64)]
+    colors[np.isnan(scores)] = NO_PATCH
+    return colors
+
+
+def _score_table(steps: int = 256) -> Floats:
+    """(steps, 3) the colors between SCORE_COLORS at equal distances in CIE L*a*b*, so that equal
+    differences of score look equal."""
+    anchors = np.array([[int(text[k : k + 2], 16) / 255 for k in (1, 3, 5)] for text in SCORE_COLORS])
+    place = np.linspace(0, len(anchors) - 1, 8 * steps)
+    path = np.stack([np.interp(place, np.arange(len(anchors)), channel) for channel in anchors.T], axis=1)
+    walked = np.linalg.norm(np.diff(srgb_to_lab(path), axis=0), axis=1).cumsum()
+    walked = np.concatenate([[0], walked])
+    even = np.linspace(0, walked[-1], steps)
+    return np.stack([np.interp(even, walked, channel) for channel in path.T], axis=1)
+
+
+def write_picture(path: str, reference: Surface, distorted: Surface, result: Result, width: int = WIDTH) -> None:
+    """A PNG of the reference, the distorted surface, and the reference colored by FMQM.
+
+    The file is replaced when the new one is complete, or not at all.
+
+    Args:
+        reference, distorted: what the result compares. width: of the picture, in pixels.
+
+    Raises:
+        FMQMError: Pillow is missing. FileError: the path cannot be written.
+    """
+    _require_pillow()
+    with replaced(path) as temporary:
+        compose(reference, distorted, result, width).save(temporary, "PNG")
+
+
+def compose(reference: Surface, distorted: Surface, result: Result, width: int = WIDTH) -> Image:
+    """The picture of write_picture, as a Pillow image of so many pixels in width.
+
+    Raises:
+        FMQMError: Pillow is missing.
+    """
+    _require_pillow()
+    from PIL import Image, ImageDraw
+
+    sheet = _Sheet(width, natural_aspect(reference, distorted))
+    faces = score_by_face(result, reference)
+    camera = Camera.framing(reference, distorted, aspect=sheet.panel[1] / sheet.panel[0])
+    canvas = Image.new("RGB", (width, sheet.height), BACKGROUND)
+    hits = pixel_hits(reference, camera, sheet.panel)
+    views = (
+        render(reference, camera, sheet.panel, hits=hits),
+        render(distorted, camera, sheet.panel),
+        render(reference, camera, sheet.panel, score_colors(faces), hits),
+    )
+    for index, view in enumerate(views):
+        canvas.paste(Image.fromarray(view), (sheet.left(index), sheet.top))
+    draw = ImageDraw.Draw(canvas)
+    score = float(result.scores[COLUMNS.index("FMQM")])
+    features = [f"{name} {value:.3f}" for name, value in zip(COLUMNS[:4], result.scores, strict=False)]
+    sheet.label(draw, 0, "Reference", reference.name, f"{len(reference.triangles):,} triangles")
+    sheet.label(draw, 1, "Distorted", distorted.name, f"{len(distorted.triangles):,} triangles")
+    sheet.label(draw, 2, f"FMQM {score:.4f}", "   ".join(features[:2]), "   ".join(features[2:]))
+    sheet.color_bar(draw, score, bool(np.isnan(faces).any()))
+    return canvas
+
+
+class _Sheet:
+    """Where things stand in the picture, in pixels.
+
+    Attributes:
+        panel: width and height of a panel. top: of the panels. height: of the whole.
+    """
+
+    def __init__(self, width: int, aspect: float) -> None:
+        self._unit = width / WIDTH  # type and spaces grow with the whole
+        panel_width = (width - self._px(4 * GAP + BAR_SPACE)) // 3
+        self.panel = (panel_width, round(panel_width * aspect))
+        self.top = self._px(HEAD)
+        self.height = self.top + self.panel[1] + self._px(FOOT)
+
+    def left(self, index: int) -> int:
+        """Of a panel; index 3 is the color bar."""
+        return self._px(GAP) + index * (self.panel[0] + self._px(GAP))
+
+    def label(self, draw: ImageDraw, index: int, title: str, *lines: str) -> None:
+        """A title above a panel and lines below it, centered."""
+        center = self.left(index) + self.panel[0] / 2
+        self._text(draw, (center, self._px(HEAD / 2)), title, 26, INK, "mm")
+        for number, line in enumerate(lines):
+            y = self.top + self.panel[1] + self._px(14 + 24 * number)
+            self._text(draw, (center, y), line, 17, FAINT_INK, "mm")
+
+    def color_bar(self, draw: ImageDraw, score: float, has_gaps: bool) -> None:
+        """Scores and their colors, 1 at the top, with a mark at the whole score."""
+        px = self._px
+        left, right = self.left(3), self.left(3) + px(BAR_WIDTH)
+        top, bottom = self.top + px(40), self.top + self.panel[1] - px(40)
+        rows = np.arange(bottom - top + 1)
+        for row, color in zip(rows.tolist(), score_colors(1 - rows / rows[-1]), strict=True):
+            draw.line([(left, top + row), (right, top + row)], fill=_to_bytes(color))
+        for tenth in range(0, 11, 2):
+            y = round(bottom - (bottom - top) * tenth / 10)
+            draw.line([(right + px(3), y), (right + px(8), y)], fill=RULE, width=max(px(1), 1))
+            self._text(draw, (right + px(13), y), f"{tenth / 10:.1f}", 16, INK, "lm")
+        y = round(bottom - (bottom - top) * score)
+        draw.polygon([(left - px(2), y), (left - px(11), y - px(6)), (left - px(11), y + px(6))], fill=INK)
+        self._text(draw, (left, top - px(24)), "FMQM", 16, INK, "lm")
+        if has_gaps:
+            y = bottom + px(24)
+            draw.rectangle([left, y - px(6), left + px(12), y + px(6)], fill=_to_bytes(np.array(NO_PATCH)))
+            self._text(draw, (left + px(18), y), "no patch", 14, FAINT_INK, "lm")
+
+    def _px(self, length: float) -> int:
+        """A length in a picture of the usual WIDTH, here."""
+        return round(length * self._unit)
+
+    def _text(
+        self, draw: ImageDraw, at: tuple[float, float], text: str, size: int, color: tuple[int, int, int], anchor: str
+    ) -> None:
+        """Text in one line; what is wider than a panel loses its middle."""
+        from PIL import ImageFont
+
+        font = ImageFont.load_default(max(self._px(size), 1))
+        shown = shorten(text, lambda part: draw.textlength(part, font=font) <= self.panel[0])
+        draw.text(at, shown, fill=color, font=font, anchor=anchor)
+
+
+def shorten(text: str, fits: Callable[[str], bool]) -> str:
+    """The text, or its two ends with dots between that fit."""
+    if fits(text):
+        return text
+    kept = len(text) - 1
+    while kept > 2 and not fits(f"{text[: kept - kept // 2]}...{text[-(kept // 2) :]}"):
+        kept -= 1
+    return f"{text[: kept - kept // 2]}...{text[-(kept // 2) :]}"
+
+
+def _to_bytes(color: Floats) -> tuple[int, int, int]:
+    red, green, blue = np.rint(color * 255).astype(int).tolist()
+    return red, green, blue
+
+
+def _require_pillow() -> None:
+    try:
+        import PIL.Image  # noqa: F401
+    except ImportError as error:
+        raise FMQMError(
+            "pictures need Pillow, which this Python lacks: "
+            "install it (python -m pip install Pillow) or leave the picture out"
+        ) from error

@@ -1,0 +1,197 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where the time goes: every stage of whole pairs, beside what the tree queries alone cost in the same run.
+
+    python scripts/bench.py [--growth] [--case REFERENCE DISTORTED] [--decimated REFERENCE] ...
+
+Without cases it measures generated surfaces. Each pair is scored in a process of its own, as a user would.
+The floor is the time of plain Python loops of nearest-point and ray-parity queries on both surfaces, along
+the same curve, with the tightest bounds there can be: nothing that asks the trees less can be faster.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+
+if TYPE_CHECKING:
+    from fmqm_addon.metric.fields import Fields
+    from fmqm_addon.metric.surface import Surface
+
+DECIMATED_TO = 0.25  # share of the triangles in a decimated copy
+GENERATED = (10_000, 100_000, 1_000_000)  # triangles of the growth table
+STAGES = ("load", "prepare", "fields", "features", "total")
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description="Times of whole pairs by stage, and the floor of the tree queries.")
+    parser.add_argument("--case", nargs=2, action="append", default=[], metavar=("REFERENCE", "DISTORTED"))
+    parser.add_argument(
+        "--decimated", action="append", default=[], metavar="REFERENCE", help="against a decimated copy"
+    )
+    parser.add_argument(
+        "--growth", action="store_true", help="generated surfaces of 10 thousand to 1 million triangles"
+    )
+    parser.add_argument("--samples", action="store_true", help="generated surface at 50, 100 and 200 thousand samples")
+    args = parser.parse_args()
+    everything = not (args.case or args.decimated or args.growth or args.samples)
+    print(f"{'pair':34}{'triangles':>10}" + "".join(f"{stage:>9}" for stage in STAGES) + "    floor  ratio    peak")
+    with tempfile.TemporaryDirectory() as folder:
+        for reference, distorted in args.case:
+            measure(Path(reference).name, reference, distorted)
+        for reference in args.decimated:
+            measure(Path(reference).name + " decimated", reference, decimate(reference, folder))
+        if args.growth or everything:
+            for triangles in GENERATED:
+                reference = generate(triangles, folder)
+                measure(f"generated {triangles:,}", reference, decimate(reference, folder))
+        if args.samples or everything:
+            reference = generate(GENERATED[0], folder)
+            distorted = decimate(reference, folder)
+            for samples in (50_000, 100_000, 200_000):
+                measure(f"generated, {samples:,} samples", reference, distorted, ["--samples", str(samples)])
+    return 0
+
+
+def measure(name: str, reference: str, distorted: str, flags: Sequence[str] = ()) -> None:
+    """Scores a pair in a process of its own and prints a row: seconds by stage, floor, ratio, peak memory."""
+    command = [
+        sys.executable,
+        str(ROOT / "scripts" / "score.py"),
+        reference,
+        distorted,
+        "--quiet",
+        "--json",
+        "-",
+        *flags,
+    ]
+    with tempfile.TemporaryFile() as out:
+        process = subprocess.Popen(command, stdout=out, stderr=subprocess.DEVNULL)
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        out.seek(0)
+        pair = json.load(out)["pairs"][0]
+    if pair["error"]:
+        print(f"{name:34}{pair['error']}")
+        return
+    floor, triangles = query_floor(reference, distorted, flags)
+    seconds = pair["seconds"]
+    numbers = "".join(f"{seconds[stage]:9.2f}" for stage in STAGES)
+    peak = usage.ru_maxrss / 2**20  # kilobytes on Linux
+    print(f"{name:34}{triangles:10}{numbers}{floor:9.2f}{seconds['total'] / floor:7.2f}{peak:6.2f} GB", flush=True)
+
+
+def query_floor(reference: str, distorted: str, flags: Sequence[str]) -> tuple[float, int]:
+    """Seconds of the plain loops on both surfaces, and the reference's triangles."""
+    from fmqm_addon.blender.bvh import BVHQuery
+    from fmqm_addon.blender.files import load_mesh
+    from fmqm_addon.metric.score import Evaluation
+    from fmqm_addon.metric.settings import Settings
+    from fmqm_addon.metric.spatial import morton_order
+    from fmqm_addon.metric.surface import prepare_surface
+
+    samples = int(flags[1]) if flags else Settings().samples
+    ref = prepare_surface(load_mesh(reference), BVHQuery)
+    dist = prepare_surface(load_mesh(distorted), BVHQuery, ref.frame)
+    evaluation = Evaluation(ref, Settings(samples=samples))
+    evaluation.prepare().run()
+    result = evaluation.compare(dist).run()
+    order = morton_order(result.samples.positions)
+    points = result.samples.positions[order]
+    seconds = plain_loops(ref, points, result.ref, order) + plain_loops(dist, points, result.dist, order)
+    return seconds, len(ref.triangles)
+
+
+def plain_loops(surface: Surface, points: np.ndarray, fields: Fields, order: np.ndarray) -> float:
+    """Seconds for nearest points and crossings of sorted points, one plain call after the other."""
+    tree = surface.query._tree  # type: ignore[attr-defined]
+    find, cast = tree.find_nearest, tree.ray_cast
+    away = points - fields.nearest[order]
+    length = np.linalg.norm(away, axis=1)
+    bounds = (length * 1.0001 + 1e-6).tolist()
+    directions = away / np.maximum(length, 1e-12)[:, None]
+    rays, points_list = directions.tolist(), points.tolist()
+    began = time.perf_counter()
+    for point, bound in zip(points_list, bounds, strict=True):
+        find(point, bound)
+    for point, ray in zip(points_list, rays, strict=True):
+        hit = cast(point, ray)
+        while hit[0] is not None:
+            x, y, z = hit[0]
+            hit = cast((x + 1e-6 * ray[0], y + 1e-6 * ray[1], z + 1e-6 * ray[2]), ray)
+    return time.perf_counter() - began
+
+
+def generate(triangles: int, folder: str) -> str:
+    """A bumpy torus with a generated texture, as .blend: about so many triangles."""
+    import bpy
+
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    around = round((triangles / 4) ** 0.5 * 2)
+    rows = around // 2
+    u, v = np.meshgrid(np.arange(around) / around, np.arange(rows) / rows, indexing="ij")
+    a, b = 2 * np.pi * u, 2 * np.pi * v
+    radius = 0.4 + 0.03 * np.sin(9 * a) * np.cos(7 * b) + 0.004 * np.sin(80 * a) * np.sin(60 * b)
+    ring = 1 + radius * np.cos(b)
+    positions = np.stack([ring * np.cos(a), ring * np.sin(a), radius * np.sin(b)], axis=-1).reshape(-1, 3)
+    index = np.arange(around * rows).reshape(around, rows)
+    right, up = np.roll(index, -1, 0), np.roll(index, -1, 1)
+    quads = np.stack([index, right, np.roll(right, -1, 1), up], axis=-1).reshape(-1, 4)
+    corner = np.stack([np.stack([u + i / around, v + j / rows], -1) for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))], 2)
+    mesh = bpy.data.meshes.new("torus")
+    mesh.vertices.add(len(positions))
+    mesh.vertices.foreach_set("co", positions.astype(np.float32).ravel())
+    mesh.loops.add(quads.size)
+    mesh.loops.foreach_set("vertex_index", quads.astype(np.int32).ravel())
+    mesh.polygons.add(len(quads))
+    mesh.polygons.foreach_set("loop_start", np.arange(0, quads.size, 4, dtype=np.int32))
+    mesh.uv_layers.new(name="UVMap").uv.foreach_set("vector", corner.astype(np.float32).ravel())
+    mesh.update(calc_edges=True)
+    object_ = bpy.data.objects.new("torus", mesh)
+    bpy.context.scene.collection.objects.link(object_)
+    image = bpy.data.images.new("noise", 1024, 1024)
+    pixels = np.random.default_rng(0).random((64, 64, 4), np.float32).repeat(16, 0).repeat(16, 1)
+    image.pixels.foreach_set(pixels.ravel())
+    image.pack()
+    material = bpy.data.materials.new("noise")
+    if material.node_tree is None:  # 5.0 and later always have one
+        material.use_nodes = True
+    node = material.node_tree.nodes.new("ShaderNodeTexImage")
+    node.image = image
+    shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    material.node_tree.links.new(node.outputs["Color"], shader.inputs["Base Color"])
+    mesh.materials.append(material)
+    path = Path(folder) / f"torus_{triangles}.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return str(path)
+
+
+def decimate(reference: str, folder: str) -> str:
+    """A copy with a Decimate modifier on each mesh, as .blend."""
+    import bpy
+
+    from fmqm_addon.blender.files import open_file
+
+    open_file(reference)
+    for object_ in bpy.context.scene.objects:
+        if object_.type == "MESH":
+            object_.modifiers.new("LOD", "DECIMATE").ratio = DECIMATED_TO
+    path = Path(folder) / f"{Path(reference).stem}_decimated.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return str(path)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

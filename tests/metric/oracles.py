@@ -1,0 +1,329 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Slow, plain versions of what the metric does fast, written from its definition and not from its code."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fmqm_addon.metric.color import Texture
+from fmqm_addon.metric.features import PatchField
+from fmqm_addon.metric.settings import Settings
+from fmqm_addon.metric.spatial import Floats, Ints
+
+Row = Sequence[float] | Floats
+
+# --- geometry ---------------------------------------------------------------------------------------------
+
+
+class NaiveQuery:
+    """A metric.surface.SurfaceQuery that looks at every triangle, in float64.
+
+    It also holds the caller to the protocol: bounds must be true upper bounds, directions must have unit length.
+    """
+
+    def __init__(self, vertices: Floats, triangles: Ints) -> None:
+        self.a, self.b, self.c = (vertices[triangles[:, k]] for k in range(3))
+
+    def nearest(self, points: Floats, bounds: Floats | None) -> Ints:
+        squared = squared_distances(points, self.a, self.b, self.c)
+        found = squared.argmin(axis=1)
+        if bounds is not None:
+            distance = np.sqrt(squared[np.arange(len(points)), found])
+            assert (distance <= bounds).all(), "a bound is below the distance"
+        return np.asarray(found, np.int64)
+
+    def first_hit(self, origins: Floats, directions: Floats) -> tuple[Ints, Floats]:
+        assert np.allclose(np.linalg.norm(directions, axis=1), 1), "a direction is not of unit length"
+        distance = ray_distances(origins, directions, self.a, self.b, self.c)
+        first = distance.argmin(axis=1)
+        distance = distance[np.arange(len(origins)), first]
+        return np.where(np.isfinite(distance), first, -1), distance
+
+
+def squared_distances(points: Floats, a: Floats, b: Floats, c: Floats) -> Floats:
+    """(N, T) squared distances of points and triangles: by the regions of Ericson, Real-Time Collision Detection."""
+    p = points[:, None]
+    ab, ac = b - a, c - a
+    ap, bp, cp = p - a, p - b, p - c
+    d1, d2 = (ap * ab).sum(2), (ap * ac).sum(2)
+    d3, d4 = (bp * ab).sum(2), (bp * ac).sum(2)
+    d5, d6 = (cp * ab).sum(2), (cp * ac).sum(2)
+    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
+
+    def ratio(x: Floats, y: Floats) -> Floats:
+        return x / np.where(y == 0, 1, y)
+
+    regions = [
+        ((d1 <= 0) & (d2 <= 0), 0 * d1, 0 * d1),
+        ((d3 >= 0) & (d4 <= d3), 1 + 0 * d1, 0 * d1),
+        ((d6 >= 0) & (d5 <= d6), 0 * d1, 1 + 0 * d1),
+        ((vc <= 0) & (d1 >= 0) & (d3 <= 0), ratio(d1, d1 - d3), 0 * d1),
+        ((vb <= 0) & (d2 >= 0) & (d6 <= 0), 0 * d1, ratio(d2, d2 - d6)),
+        ((va <= 0) & (d4 >= d3) & (d5 >= d6), 1 - ratio(d4 - d3, d4 - d3 + d5 - d6), ratio(d4 - d3, d4 - d3 + d5 - d6)),
+    ]
+    v = np.select([r[0] for r in regions], [r[1] for r in regions], ratio(vb, va + vb + vc))
+    w = np.select([r[0] for r in regions], [r[2] for r in regions], ratio(vc, va + vb + vc))
+    gap = p - a - v[..., None] * ab - w[..., None] * ac
+    squared: Floats = (gap * gap).sum(2)
+    return squared
+
+
+def ray_distances(origins: Floats, directions: Floats, a: Floats, b: Floats, c: Floats) -> Floats:
+    """(N, T) distances along the rays (Moeller and Trumbore), inf for a miss; edges belong to their triangles."""
+    d, ab, ac = directions[:, None], b - a, c - a
+    h = np.cross(d, ac)
+    det = (h * ab).sum(2)
+    parallel = np.abs(det) < 1e-14
+    inverse = 1 / np.where(parallel, 1, det)
+    s = origins[:, None] - a
+    u = (s * h).sum(2) * inverse
+    q = np.cross(s, ab)
+    v = (d * q).sum(2) * inverse
+    t = (ac * q).sum(2) * inverse
+    edge = 1e-12
+    hit: NDArray[np.bool_] = ~parallel & (u >= -edge) & (v >= -edge) & (u + v <= 1 + edge) & (t > 0)
+    return np.where(hit, t, np.inf)
+
+
+def exact_distance(point: Row, a: Row, b: Row, c: Row) -> float:
+    """Distance of a point and a triangle with area, in exact rational arithmetic until the last square root."""
+    p, q, r, s = ([Fraction(float(x)) for x in row] for row in (point, a, b, c))
+
+    def minus(x: list[Fraction], y: list[Fraction]) -> list[Fraction]:
+        return [i - j for i, j in zip(x, y, strict=True)]
+
+    def inner(x: list[Fraction], y: list[Fraction]) -> Fraction:
+        return sum((i * j for i, j in zip(x, y, strict=True)), Fraction(0))
+
+    ab, ac, ap = minus(r, q), minus(s, q), minus(p, q)
+    uu, uv, vv, pu, pv = inner(ab, ab), inner(ab, ac), inner(ac, ac), inner(ap, ab), inner(ap, ac)
+    det = uu * vv - uv * uv
+    beta, gamma = (vv * pu - uv * pv) / det, (uu * pv - uv * pu) / det
+    if beta >= 0 and gamma >= 0 and beta + gamma <= 1:
+        gap = [x - beta * y - gamma * z for x, y, z in zip(ap, ab, ac, strict=True)]
+        return math.sqrt(inner(gap, gap))
+    best = None
+    for start, end in ((q, r), (r, s), (s, q)):
+        edge, offset = minus(end, start), minus(p, start)
+        t = min(max(inner(offset, edge) / inner(edge, edge), Fraction(0)), Fraction(1))
+        gap = [x - t * y for x, y in zip(offset, edge, strict=True)]
+        best = inner(gap, gap) if best is None else min(best, inner(gap, gap))
+    assert best is not None
+    return math.sqrt(best)
+
+
+def winding_number(point: Floats, vertices: Floats, triangles: Ints) -> float:
+    """How often a closed surface goes around a point (van Oosterom and Strackee)."""
+    total = 0.0
+    for triangle in triangles:
+        a, b, c = vertices[triangle] - point
+        la, lb, lc = (float(np.linalg.norm(x)) for x in (a, b, c))
+        numerator = float(np.dot(a, np.cross(b, c)))
+        total += 2 * math.atan2(numerator, la * lb * lc + np.dot(a, b) * lc + np.dot(b, c) * la + np.dot(c, a) * lb)
+    return total / (4 * math.pi)
+
+
+# --- surfaces and patches ---------------------------------------------------------------------------------
+
+
+def weld_with_dict(positions: Floats, triangles: Ints) -> tuple[list[tuple[float, ...]], list[list[int]]]:
+    """Equal positions are one vertex; the vertices are numbered by x, then y, then z."""
+    rows = [tuple(float(x) for x in row) for row in positions]
+    number = {row: k for k, row in enumerate(sorted(set(rows)))}
+    return list(number), [[number[rows[v]] for v in triangle] for triangle in triangles.tolist()]
+
+
+def first_of_each(triangles: Ints) -> list[bool]:
+    seen: set[frozenset[int]] = set()
+    result = []
+    for triangle in triangles.tolist():
+        result.append(frozenset(triangle) not in seen)
+        seen.add(frozenset(triangle))
+    return result
+
+
+def heron(a: Row, b: Row, c: Row) -> float:
+    x, y, z = sorted((math.dist(a, b), math.dist(b, c), math.dist(c, a)), reverse=True)
+    return math.sqrt(max((x + (y + z)) * (z - (x - y)) * (z + (x - y)) * (x + (y - z)), 0)) / 4  # Kahan's order
+
+
+def farthest_points_by_loop(vertices: Floats, count: int, tie: float = 1e-5) -> list[int]:
+    """Farthest point sampling: ties up to a relative difference go to the lowest index."""
+
+    def farthest(distance: Floats) -> int:
+        return next(i for i, d in enumerate(distance.tolist()) if d >= distance.max() * (1 - tie))
+
+    centers = [farthest(np.linalg.norm(vertices - vertices.mean(axis=0), axis=1))]
+    nearest = np.full(len(vertices), np.inf)
+    while len(centers) < count:
+        nearest = np.minimum(nearest, np.linalg.norm(vertices - vertices[centers[-1]], axis=1))
+        centers.append(farthest(nearest))
+    return centers
+
+
+def grow_with_sets(
+    vertices: Floats, triangles: Ints, areas: Floats, center: int, n_patches: int
+) -> tuple[set[int], bool]:
+    """Faces of a patch by whole rings; then, if those run out, the nearest centroids. And whether they ran out."""
+    target = areas.sum() / n_patches * (1 - 1e-9)
+    faces: set[int] = set()
+    inside = {center}
+    while True:
+        ring = {f for f, corners in enumerate(triangles.tolist()) if inside & set(corners)}
+        grown = faces | ring
+        ran_out = grown == faces
+        faces = grown
+        inside |= {v for f in faces for v in triangles[f].tolist()}
+        if ran_out or sum(areas[list(faces)]) >= target:
+            break
+    if not ran_out:
+        return faces, False
+    centroid = vertices[triangles].mean(axis=1)
+    rest = sorted(set(range(len(triangles))) - faces, key=lambda f: (math.dist(centroid[f], vertices[center]), f))
+    for face in rest:
+        if sum(areas[list(faces)]) >= target:
+            break
+        faces.add(face)
+    return faces, True
+
+
+# --- color ------------------------------------------------------------------------------------------------
+
+
+def texture_color(texture: Texture, u: float, v: float) -> list[float]:
+    """One lookup, in exact rational arithmetic: i = u W - 0.5, j = (1 - v) H - 0.5, four pixels."""
+    height, width = texture.pixels.shape[:2]
+    if texture.extension == "clip" and not (0 <= u <= 1 and 0 <= v <= 1):
+        return [0.0, 0.0, 0.0]
+    i, j = Fraction(u) * width - Fraction(1, 2), (1 - Fraction(v)) * height - Fraction(1, 2)
+
+    def pixel(column: int, row: int) -> list[Fraction]:
+        def wrap(index: int, size: int) -> int:
+            if texture.extension == "repeat":
+                return index % size
+            if texture.extension == "mirror":
+                index %= 2 * size
+                return index if index < size else 2 * size - 1 - index
+            return min(max(index, 0), size - 1)
+
+        full = 255 if texture.pixels.dtype == np.uint8 else 1
+        return [Fraction(float(x)) / full for x in texture.pixels[wrap(row, height), wrap(column, width)]]
+
+    if texture.interpolation == "closest":
+        return [float(x) for x in pixel(math.floor(i + Fraction(1, 2)), math.floor(j + Fraction(1, 2)))]
+    left, top = math.floor(i), math.floor(j)
+    color = [Fraction(0)] * 3
+    for column, row, weight in (
+        (left, top, (left + 1 - i) * (top + 1 - j)),
+        (left + 1, top, (i - left) * (top + 1 - j)),
+        (left, top + 1, (left + 1 - i) * (j - top)),
+        (left + 1, top + 1, (i - left) * (j - top)),
+    ):
+        color = [x + weight * y for x, y in zip(color, pixel(column, row), strict=True)]
+    return [float(x) for x in color]
+
+
+# --- features ---------------------------------------------------------------------------------------------
+
+
+def unit_members(
+    positions: Floats, towards: Floats, unit: int, radius: float, above: float | None = None, below: float | None = None
+) -> list[int]:
+    """p' of the unit of p, without p: 0 < |pp'| < r and |cos(pp_n, pp')| above or below its threshold."""
+    members = []
+    for other in range(len(positions)):
+        offset = positions[other] - positions[unit]
+        distance = math.hypot(*offset)
+        if not 0 < distance < radius:
+            continue
+        length = math.hypot(*towards[unit])
+        cosine = abs(float(np.dot(towards[unit], offset))) / (length * distance) if length else 0.0
+        if (above is not None and cosine > above) or (below is not None and cosine < below):
+            members.append(other)
+    return members
+
+
+def s_of(a: Row, b: Row, e: float) -> float:
+    """METRIC "Four features": s(a, b) from population moments."""
+    n = len(a)
+    mean_a, mean_b = math.fsum(a) / n, math.fsum(b) / n
+    dev_a = math.sqrt(math.fsum((x - mean_a) ** 2 for x in a) / n)
+    dev_b = math.sqrt(math.fsum((x - mean_b) ** 2 for x in b) / n)
+    together = math.fsum((x - mean_a) * (y - mean_b) for x, y in zip(a, b, strict=True)) / n
+    mean = abs(2 * mean_a * mean_b + e) / (mean_a**2 + mean_b**2 + e)
+    std = (2 * dev_a * dev_b + e) / (dev_a**2 + dev_b**2 + e)
+    cov = min(1.0, (abs(together) + e) / (dev_a * dev_b + e))
+    return math.cbrt(mean * std * cov)
+
+
+def steepest(positions: Floats, channel: Floats, unit: int, members: list[int]) -> tuple[float, Floats]:
+    """Equations (30), (31): gradient magnitude and signed unit direction; zeros for no gradient."""
+    best, direction = 0.0, np.zeros(3)
+    for other in members:
+        difference = float(channel[other] - channel[unit])
+        offset = positions[other] - positions[unit]
+        slope = abs(difference) / math.hypot(*offset) if abs(difference) > 1e-6 else 0.0
+        if slope > best:
+            best, direction = slope, math.copysign(1, difference) * offset / math.hypot(*offset)
+    return best, direction
+
+
+def weighted_mean(values: Row, weights: Row) -> float:
+    return math.fsum(v * w for v, w in zip(values, weights, strict=True)) / math.fsum(weights)
+
+
+def color_gradient_similarity(
+    ref: list[list[tuple[float, Floats]]], dist: list[list[tuple[float, Floats]]], weights: Row
+) -> float:
+    """Equations (32) to (34) from [channel][unit] gradients."""
+    angular, magnitude = [], []
+    for channel_r, channel_d in zip(ref, dist, strict=True):
+        cosines, unlike = [], []
+        for (a, dir_a), (b, dir_b) in zip(channel_r, channel_d, strict=True):
+            cosines.append(1.0 if a == 0 and b == 0 else float(np.dot(dir_a, dir_b)) ** 2)
+            unlike.append(abs(a * a - b * b) / (a * a + b * b + 1e-10))
+        angular.append(math.sqrt(math.fsum(cosines) / len(cosines)))
+        magnitude.append(1 - math.sqrt(math.fsum(unlike) / len(unlike)))
+    return math.sqrt(weighted_mean(angular, weights) * weighted_mean(magnitude, weights))
+
+
+def gradient_cosines(positions: Floats, nearest_r: Floats, nearest_d: Floats) -> float:
+    """Equation (23): root mean square of g_r . g_d; a sample on either surface counts 1."""
+    total = []
+    for p, r, d in zip(positions, nearest_r, nearest_d, strict=True):
+        to_r, to_d = p - r, p - d
+        length = math.hypot(*to_r) * math.hypot(*to_d)
+        total.append((float(np.dot(to_r, to_d)) / length) ** 2 if length else 1.0)
+    return math.sqrt(math.fsum(total) / len(total))
+
+
+def features_by_loop(
+    positions: Floats, ref: PatchField, dist: PatchField, units: Ints, weights: Floats, settings: Settings
+) -> list[float]:
+    """METRIC "Four features of a patch", sentence by sentence; lengths in patch diagonals."""
+    normal: list[float] = []
+    tangent: list[float] = []
+    for unit in units.tolist():
+        towards = ref.nearest - positions
+        along = [unit, *unit_members(positions, towards, unit, settings.radius, above=settings.normal_threshold)]
+        across = [unit, *unit_members(positions, towards, unit, settings.radius, below=settings.tangent_threshold)]
+        for members, into in ((along, normal), (across, tangent)):
+            s = [s_of(ref.channels[members, c].tolist(), dist.channels[members, c].tolist(), 1e-10) for c in range(3)]
+            into.append(weighted_mean(s, weights))
+
+    def gradients(field: PatchField) -> list[list[tuple[float, Floats]]]:
+        towards, radius, below = field.nearest - positions, settings.gradient_radius, settings.tangent_threshold
+        members = {unit: unit_members(positions, towards, unit, radius, below=below) for unit in units.tolist()}
+        return [[steepest(positions, field.channels[:, c], unit, members[unit]) for unit in members] for c in range(3)]
+
+    return [
+        s_of(ref.sdf.tolist(), dist.sdf.tolist(), 1e-12),
+        gradient_cosines(positions, ref.nearest, dist.nearest),
+        math.sqrt(np.mean(normal) * np.mean(tangent)),
+        color_gradient_similarity(gradients(ref), gradients(dist), weights),
+    ]

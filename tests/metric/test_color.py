@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Texture lookup pixel by pixel, and color spaces by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fmqm_addon.metric.color import (
+    Extension,
+    Interpolation,
+    PlainColor,
+    Texture,
+    channel_weights,
+    channels,
+    decode_srgb,
+    encode_srgb,
+    srgb_to_lab,
+)
+
+from .oracles import texture_color
+
+EXTENSIONS: tuple[Extension, ...] = ("repeat", "extend", "clip", "mirror")
+INTERPOLATIONS: tuple[Interpolation, ...] = ("linear", "closest")
+
+coordinate = st.one_of(
+    st.floats(-3, 3, allow_subnormal=False),
+    st.sampled_from([0.0, -0.0, 0.25, 0.5, 1.0, -1.0, 2.0, 0.125, 1e6 + 0.375, -1e6 - 0.375, -1e-17, 1 + 2**-52]),
+)
+
+
+@given(
+    st.tuples(st.integers(1, 7), st.integers(1, 7)),
+    st.booleans(),
+    st.sampled_from(EXTENSIONS),
+    st.lists(st.tuples(coordinate, coordinate), min_size=1, max_size=8),
+)
+def test_linear_lookup(
+    size: tuple[int, int], as_bytes: bool, extension: Extension, uv: list[tuple[float, float]]
+) -> None:
+    """Equation (6) and bilinear interpolation, to 1e-7 also at u = 1e6."""
+    rng = np.random.default_rng(size)
+    pixels = rng.integers(0, 256, (*size, 3), np.uint8) if as_bytes else rng.random((*size, 3), np.float32)
+    image = Texture(pixels, extension)
+    expected = [texture_color(image, u, v) for u, v in uv]
+    found = image.lookup(np.array(uv))
+    assert found.dtype == np.float64
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-7)
+
+
+@given(
+    st.tuples(st.integers(1, 5), st.integers(1, 5)),
+    st.booleans(),
+    st.sampled_from(EXTENSIONS),
+    st.lists(st.tuples(st.integers(-30, 29), st.integers(-30, 29), st.floats(0.01, 0.99), st.floats(0.01, 0.99))),
+    st.sampled_from([0, 1e6, -1e6]),
+)
+def test_closest_lookup(
+    size: tuple[int, int],
+    as_bytes: bool,
+    extension: Extension,
+    places: list[tuple[int, int, float, float]],
+    away: float,
+) -> None:
+    """The pixel that holds the point, for points inside pixels."""
+    rng = np.random.default_rng(size)
+    pixels = rng.integers(0, 256, (*size, 3), np.uint8) if as_bytes else rng.random((*size, 3), np.float32)
+    image = Texture(pixels, extension, "closest")
+    uv = np.array([(away + (i + x) / size[1], away + (j + y) / size[0]) for i, j, x, y in places]).reshape(-1, 2)
+    expected = np.array([texture_color(image, u, v) for u, v in uv.tolist()]).reshape(-1, 3)
+    assert image.lookup(uv).tolist() == expected.tolist()
+
+
+ROWS = np.array([[[0, 0, 0], [100, 0, 0]], [[200, 0, 0], [40, 0, 0]]], np.uint8)  # top row: 0 100, bottom: 200 40
+
+
+@pytest.mark.parametrize(
+    ("extension", "u", "v", "red"),
+    [
+        ("repeat", 0.25, 0.75, 0),  # centers of the four pixels; v goes up, rows go down
+        ("repeat", 0.75, 0.75, 100),
+        ("repeat", 0.25, 0.25, 200),
+        ("repeat", 0.75, 0.25, 40),
+        ("repeat", 0.5, 0.75, 50),
+        ("repeat", 0.5, 0.5, 85),
+        ("repeat", 0.0, 0.75, 50),  # half way to the neighbor around the border
+        ("extend", 0.0, 0.75, 0),
+        ("extend", 1.0, 0.75, 100),
+        ("extend", 7.0, -7.0, 40),
+        ("clip", 0.0, 0.75, 0),
+        ("clip", 1.0, 0.25, 40),
+        ("clip", 1.001, 0.25, 0),
+        ("clip", 0.75, -0.001, 0),
+        ("mirror", 1.25, 0.75, 100),
+        ("mirror", 1.75, 0.25, 200),
+        ("mirror", -0.25, 0.75, 0),
+        ("mirror", 0.75, -0.25, 40),
+        ("mirror", 1.0, 0.75, 100),
+        ("repeat", 1.25, -0.75, 200),
+    ],
+)
+def test_lookup_by_hand(extension: Extension, u: float, v: float, red: float) -> None:
+    for scale, image in ((255, ROWS), (255, (ROWS / 255).astype(np.float32))):
+        found = Texture(image, extension).lookup(np.array([[u, v]]))
+        np.testing.assert_allclose(found * scale, [[red, 0, 0]], atol=1e-5)
+
+
+@pytest.mark.parametrize("extension", EXTENSIONS)
+@pytest.mark.parametrize("interpolation", INTERPOLATIONS)
+def test_one_pixel_is_one_color(extension: Extension, interpolation: Interpolation) -> None:
+    image = Texture(np.array([[[51, 102, 255]]], np.uint8), extension, interpolation)
+    uv = np.random.default_rng(0).random((20, 2))
+    np.testing.assert_allclose(image.lookup(uv), np.tile([0.2, 0.4, 1.0], (20, 1)), atol=1e-15)
+
+
+@pytest.mark.parametrize("interpolation", INTERPOLATIONS)
+def test_colors_stay_in_range(interpolation: Interpolation) -> None:
+    image = Texture(np.full((3, 3, 3), 255, np.uint8), "repeat", interpolation)
+    uv = np.random.default_rng(0).normal(0, 1e3, (500, 2))
+    assert (image.lookup(uv).astype(np.float32) == 1).all()
+
+
+@pytest.mark.xfail(strict=True, reason="not decided: the cast of nan gives nan colors, and nan scores")
+@pytest.mark.parametrize("extension", EXTENSIONS)
+def test_uvs_that_are_not_numbers_still_give_a_color(extension: Extension) -> None:
+    with np.errstate(all="ignore"):
+        found = Texture(ROWS, extension).lookup(np.array([[np.nan, 0.5], [0.5, np.inf], [-np.inf, 0]]))
+    assert np.isfinite(found).all()
+
+
+@pytest.mark.xfail(strict=True, reason="(1 - v) H rounds down from the top: at v = 0 the row is H, repeated to 0")
+def test_closest_pixel_at_the_lower_border_is_in_the_bottom_row() -> None:
+    """As Blender has it: row floor(v H) from below."""
+    assert Texture(ROWS, "repeat", "closest").lookup(np.zeros((1, 2)))[0, 0] == pytest.approx(200 / 255)
+
+
+def test_plain_color() -> None:
+    assert PlainColor((0.1, 0.2, 0.3)).lookup(np.zeros((4, 2))).tolist() == [[0.1, 0.2, 0.3]] * 4
+
+
+@pytest.mark.parametrize(
+    ("linear", "encoded"),
+    [(0, 0), (1, 1), (0.0031308, 0.04045), (0.214041, 0.5), (0.5, 0.735357), (0.001, 0.01292), (-3, 0), (9, 1)],
+)
+def test_srgb_encoding_by_hand(linear: float, encoded: float) -> None:
+    assert encode_srgb(np.array([linear]))[0] == pytest.approx(encoded, abs=1e-5)
+    if 0 <= linear <= 1:
+        assert decode_srgb(np.array([encoded]))[0] == pytest.approx(linear, abs=1e-5)
+
+
+@given(st.floats(0, 1))
+def test_srgb_goes_back_and_forth(x: float) -> None:
+    assert decode_srgb(encode_srgb(np.array([x])))[0] == pytest.approx(x, abs=2e-7)
+
+
+@pytest.mark.parametrize(
+    ("rgb", "lab"),
+    [
+        ((1, 1, 1), (100, 0, 0)),
+        ((0, 0, 0), (0, 0, 0)),
+        ((0.5, 0.5, 0.5), (53.39, 0, 0)),
+        ((1, 0, 0), (53.24, 80.09, 67.20)),
+        ((0, 1, 0), (87.73, -86.18, 83.18)),
+        ((0, 0, 1), (32.30, 79.19, -107.86)),
+        ((1, 1, 0), (97.14, -21.55, 94.48)),
+        ((0.02, 0.02, 0.02), (1.40, 0, 0)),  # the straight part of f: 903.3 Y
+    ],
+)
+def test_lab_by_hand(rgb: tuple[float, ...], lab: tuple[float, ...]) -> None:
+    np.testing.assert_allclose(srgb_to_lab(np.array([rgb], float))[0] * 100, lab, atol=0.02)
+
+
+def test_channels_are_the_saved_values() -> None:
+    """RGB: the float32 NCF, no more digits; Lab: made of it and rounded alike."""
+    ncf = np.random.default_rng(0).random((50, 3)).astype(np.float32)
+    rgb, lab = channels(ncf, "rgb"), channels(ncf, "lab")
+    assert rgb.dtype == lab.dtype == np.float64
+    assert np.array_equal(rgb.astype(np.float32), ncf)
+    assert np.array_equal(lab, lab.astype(np.float32))
+    np.testing.assert_allclose(lab, srgb_to_lab(ncf.astype(np.float64)), atol=1e-6)
+
+
+def test_channel_weights() -> None:
+    assert channel_weights("lab").tolist() == [6, 1, 1]
+    assert len(set(channel_weights("rgb").tolist())) == 1
