@@ -179,15 +179,19 @@ def generate(triangles: int, folder: str) -> str:
 
 
 def decimate(reference: str, folder: str) -> str:
-    """A copy with a Decimate modifier on each mesh, as .blend."""
+    """A decimated copy of each mesh, as .blend."""
     import bpy
 
     from fmqm_addon.blender.files import open_file
 
     open_file(reference)
-    for object_ in bpy.context.scene.objects:
-        if object_.type == "MESH":
-            object_.modifiers.new("LOD", "DECIMATE").ratio = DECIMATED_TO
+    meshes = [object_ for object_ in bpy.context.scene.objects if object_.type == "MESH"]
+    for object_ in meshes:
+        object_.modifiers.new("LOD", "DECIMATE").ratio = DECIMATED_TO
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    for object_ in meshes:  # keep the outcome, not the modifier: its own time is not what is measured
+        object_.data = bpy.data.meshes.new_from_object(object_.evaluated_get(depsgraph), depsgraph=depsgraph)
+        object_.modifiers.clear()
     path = Path(folder) / f"{Path(reference).stem}_decimated.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     return str(path)

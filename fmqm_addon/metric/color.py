@@ -62,15 +62,15 @@ class Texture:
         i, j = u * width - 0.5, (1 - v) * height - 0.5
         pixels = self.pixels.reshape(-1, 3)
         if self.interpolation == "closest":
-            color = pixels[self._wrap(np.floor(j + 0.5), height) * width + self._wrap(np.floor(i + 0.5), width)]
-            color = color.astype(np.float64)
+            row, column = self._wrap(np.floor(j + 0.5), height), self._wrap(np.floor(i + 0.5), width)
+            color = _at(pixels, row * width + column).astype(np.float64)
         else:
             i0, j0 = np.floor(i), np.floor(j)
             fi, fj = (i - i0)[:, None], (j - j0)[:, None]
             left, right = self._wrap(i0, width), self._wrap(i0 + 1, width)
             top, bottom = self._wrap(j0, height) * width, self._wrap(j0 + 1, height) * width
-            color = (pixels[top + left] * (1 - fi) + pixels[top + right] * fi) * (1 - fj)
-            color += (pixels[bottom + left] * (1 - fi) + pixels[bottom + right] * fi) * fj
+            color = (_at(pixels, top + left) * (1 - fi) + _at(pixels, top + right) * fi) * (1 - fj)
+            color += (_at(pixels, bottom + left) * (1 - fi) + _at(pixels, bottom + right) * fi) * fj
         if self.pixels.dtype == np.uint8:
             color /= 255
         if self.extension == "clip":
@@ -86,6 +86,10 @@ class Texture:
             whole %= 2 * size
             return np.minimum(whole, 2 * size - 1 - whole)
         return np.clip(whole, 0, size - 1)
+
+
+def _at(pixels: NDArray[Any], index: NDArray[np.int64]) -> NDArray[Any]:
+    return pixels.take(index, axis=0)
 
 
 Color = PlainColor | Texture

@@ -112,11 +112,10 @@ def find_pairs(positions: Floats, units: Ints, radius: float) -> Pairs:
 
     The rough squared distances are inner products: p.p - 2 p.p' + p'.p'.
     """
-    rough = (positions - positions.mean(axis=0)).astype(np.float32).T
-    squares, ones = (rough * rough).sum(axis=0, keepdims=True), np.ones((1, len(positions)), np.float32)
-    of_units = np.concatenate([-2 * rough, squares, ones])[:, units]
-    of_others = np.concatenate([rough, ones, squares])
-    squared = np.einsum("ku,kn->un", of_units, of_others)
+    x, y, z = (positions - positions.mean(axis=0)).astype(np.float32).T
+    squares, ones = x * x + y * y + z * z, np.ones(len(positions), np.float32)
+    of_units = np.stack([-2 * x, -2 * y, -2 * z, squares, ones])[:, units].copy()  # einsum is slow on strides
+    squared = np.einsum("ku,kn->un", of_units, np.stack([x, y, z, ones, squares]))
     row, other = np.divmod(np.flatnonzero(squared < radius * radius + ROUGH), len(positions))
     offset = positions.take(other, axis=0) - positions.take(units.take(row), axis=0)
     distance = np.sqrt(dot(offset, offset))

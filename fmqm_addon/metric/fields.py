@@ -138,5 +138,6 @@ def _guide(order: Ints, index: int) -> Ints:
 
 
 def _closest(surface: Surface, points: Floats, triangle: Ints) -> tuple[Floats, Floats]:
-    a, b, c = (surface.vertices[surface.triangles[triangle, k]] for k in range(3))
+    corners = surface.triangles.take(triangle, axis=0)
+    a, b, c = (surface.vertices.take(corners[:, k], axis=0) for k in range(3))
     return closest_on_triangles(points, a, b, c)

@@ -92,7 +92,7 @@ class Surface:
 
     def color_at(self, triangle: Ints, barycentric: Floats) -> Floats:
         """Equations (5) to (7): (N, 3) float64 sRGB colors at barycentric (N, 3) places of (N,) triangles."""
-        uv = np.einsum("nk,nkc->nc", barycentric, self.uv[triangle])
+        uv = np.einsum("nk,nkc->nc", barycentric, self.uv.take(triangle, axis=0))
         if len(self.colors) == 1:
             return self.colors[0].lookup(uv)
         material = self.material[triangle]

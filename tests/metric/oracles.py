@@ -56,7 +56,8 @@ def squared_distances(points: Floats, a: Floats, b: Floats, c: Floats) -> Floats
     va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
 
     def ratio(x: Floats, y: Floats) -> Floats:
-        return x / np.where(y == 0, 1, y)
+        quotient: Floats = x / np.where(y == 0, 1, y)
+        return quotient
 
     regions = [
         ((d1 <= 0) & (d2 <= 0), 0 * d1, 0 * d1),

@@ -202,7 +202,8 @@ def test_what_collapses_in_the_frame_is_left_out(whole_mesh: bool) -> None:
 def test_areas_and_normals(seed: int) -> None:
     corners = np.random.default_rng(seed).normal(size=(5, 3, 3))
     vertices, triangles = corners.reshape(-1, 3), np.arange(15).reshape(5, 3)
-    np.testing.assert_allclose(triangle_areas(vertices, triangles), [heron(a, b, c) for a, b, c in corners], rtol=1e-9)
+    expected = np.array([heron(a, b, c) for a, b, c in corners])
+    np.testing.assert_allclose(triangle_areas(vertices, triangles), expected, rtol=1e-9)
     for normal, (a, b, c) in zip(triangle_normals(vertices, triangles), corners, strict=True):
         assert np.linalg.norm(normal) == pytest.approx(1)
         assert abs(normal @ (b - a)) + abs(normal @ (c - a)) == pytest.approx(0, abs=1e-12)
@@ -222,8 +223,8 @@ def test_color_at_looks_up_each_triangles_own_material() -> None:
     positions, triangles = TETRAHEDRON
     prepared = prepare_surface(MeshArrays("m", positions, triangles, uv, np.array([0, 1, 1, 2]), colors), NaiveQuery)
     place = np.array([[0.5, 0.25, 0.25], [0.5, 0.25, 0.25], [0.2, 0.1, 0.7], [1, 0, 0], [0.2, 0.7, 0.1]])
-    found = prepared.color_at(np.array([0, 1, 2, 3, 1]), place)
-    np.testing.assert_allclose(found, [[0.1, 0.2, 0.3], [0, 0, 1], [1, 0, 0], [1, 0, 1], [1, 1, 1]])
+    expected = np.array([[0.1, 0.2, 0.3], [0, 0, 1], [1, 0, 0], [1, 0, 1], [1, 1, 1]])
+    np.testing.assert_allclose(prepared.color_at(np.array([0, 1, 2, 3, 1]), place), expected)
 
 
 def test_uv_is_interpolated_with_barycentric_coordinates() -> None:
