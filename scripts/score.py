@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO, TypeVar
+from typing import TYPE_CHECKING, NoReturn, TextIO, TypeVar
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
@@ -26,12 +26,19 @@ if TYPE_CHECKING:
     from fmqm_addon.metric.score import Stepper
     from fmqm_addon.metric.surface import MeshArrays
 
-OK, FAILED, INTERRUPTED = 0, 1, 130
+OK, FAILED, WRONG_ARGUMENTS, INTERRUPTED = 0, 1, 2, 130
 T = TypeVar("T")
 
 
+class OneLineParser(argparse.ArgumentParser):
+    """Says what is wrong in one line, without the whole usage before it."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(WRONG_ARGUMENTS, f"{self.prog}: error: {message} (--help lists all arguments)\n")
+
+
 def build_parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = OneLineParser(
         prog="score.py",
         description="FMQM: how much textured meshes look like their reference; 1 is the same.",
         epilog="Files: .obj .ply .stl .glb .gltf .fbx .usd .usda .usdc .usdz .abc .blend, and file.blend:Object name. "

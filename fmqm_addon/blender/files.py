@@ -57,6 +57,8 @@ def open_file(path: str) -> None:
         raise FileError(f"{path}: no such file")
     if not os.access(path, os.R_OK):
         raise FileError(f"{path}: permission denied; the file cannot be read")
+    if suffix == ".abc":
+        _check_alembic(path)
     _clear_session()
     try:
         _open(os.path.abspath(path), suffix)
@@ -89,6 +91,24 @@ def _open(path: str, suffix: str) -> None:
     result = operator(filepath=path)
     if "FINISHED" not in result:
         raise FileError(f"{path}: the importer refused it ({', '.join(result).lower()})")
+
+
+def _check_alembic(path: str) -> None:
+    """Refuses a truncated archive, on which Blender's reader aborts the whole process.
+
+    Ogawa: magic and version, 8 bytes; position of the root group, which is written last; that group is
+    the number of its children, then their positions. All whole numbers are 64 bits, little-endian.
+    """
+    size = os.path.getsize(path)
+    with open(path, "rb") as file:
+        header = file.read(16)
+        if not header.startswith(b"Ogawa"):
+            return  # the importer says what it is not
+        root = int.from_bytes(header[8:], "little")
+        file.seek(min(root, size))
+        children = int.from_bytes(file.read(8), "little")
+    if len(header) < 16 or root + 8 + 8 * children > size:
+        raise FileError(f"{path}: the Alembic archive is truncated")
 
 
 _IMPORTERS: dict[str, Callable[[], bpy.types.Operator]] = {

@@ -49,7 +49,7 @@ def slot_color(material: bpy.types.Material | None, cache: TextureCache, owner: 
     """The color of a material slot of the object named owner.
 
     Raises:
-        MeshError: the base color names an image that cannot be read.
+        MeshError: the base color names an image that cannot be read, or none.
     """
     if material is None:
         grey = _plain((DEFAULT_GREY,) * 3)
@@ -79,6 +79,11 @@ def slot_color(material: bpy.types.Material | None, cache: TextureCache, owner: 
             f"{owner}: material {material.name}: of what feeds Base Color only the image {found.image.name} is read",
         )
         node = found
+    if node.image is None:
+        raise MeshError(
+            f"{owner}: material {material.name}: {node.name}, which feeds Base Color, holds no image; "
+            "give it one (or --texture, --ref-texture)"
+        )
     vector = _source(node.inputs["Vector"])
     uv_map = vector.uv_map if vector is not None and vector.type == "UVMAP" else ""
     if vector is not None and vector.type not in {"UVMAP", "TEX_COORD"}:

@@ -32,8 +32,8 @@ def mesh_arrays(objects: Sequence[bpy.types.Object], name: str, texture: Texture
     cache = TextureCache()
     parts = []
     with evaluated(objects) as pairs:
-        for object_, depsgraph in pairs:
-            part = _object_arrays(object_, depsgraph, texture, cache)
+        for original, (object_, depsgraph) in zip(objects, pairs, strict=True):
+            part = _object_arrays(object_, depsgraph, original.name, texture, cache)
             if part is not None:
                 parts.append(part)
     if not parts:
@@ -96,9 +96,9 @@ class _Part:
 
 
 def _object_arrays(
-    object_: bpy.types.Object, depsgraph: bpy.types.Depsgraph, texture: Texture | None, cache: TextureCache
+    object_: bpy.types.Object, depsgraph: bpy.types.Depsgraph, name: str, texture: Texture | None, cache: TextureCache
 ) -> _Part | None:
-    """Arrays of one evaluated object; None if it has no faces."""
+    """Arrays of one evaluated object; None if it has no faces. The name is the original's, for messages."""
     mesh = object_.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph)
     try:
         if mesh is None or not len(mesh.polygons):
@@ -112,7 +112,6 @@ def _object_arrays(
         slot = _read(mesh.polygons, "material_index", (len(mesh.polygons),), np.int32)[polygon]
         slots, material = np.unique(slot, return_inverse=True)
 
-        name = object_.name
         if texture is not None:
             looks = [SlotColor(texture, "")] * len(slots)
         else:
@@ -125,7 +124,7 @@ def _object_arrays(
         return _Part(
             positions=local.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3],
             triangles=triangles,
-            uv=np.nan_to_num(uv, posinf=0, neginf=0),
+            uv=uv,
             material=material.astype(np.int32),
             colors=[look.color for look in looks],
             warnings=[warning for look in looks for warning in look.warnings],

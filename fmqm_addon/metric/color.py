@@ -15,6 +15,7 @@ Interpolation = Literal["linear", "closest"]
 LAB_SCALE = 100.0  # L* of white becomes 1, as RGB's
 LAB_WEIGHTS = (6.0, 1.0, 1.0)  # supplement, "Ablations": L, a, b
 RGB_WEIGHTS = (1.0, 1.0, 1.0)  # V-E3: plain mean over r, g, b
+EDGE = 1e-9  # texture coordinates this far outside [0, 1] are on its edge, up to rounding
 _D65 = np.array([0.95047, 1.0, 1.08883])  # CIE 1931 2 degree white, Y = 1
 _RGB_TO_XYZ = np.array(  # IEC 61966-2-1
     [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]]
@@ -62,7 +63,8 @@ class Texture:
         i, j = u * width - 0.5, (1 - v) * height - 0.5
         pixels = self.pixels.reshape(-1, 3)
         if self.interpolation == "closest":
-            row, column = self._wrap(np.floor(j + 0.5), height), self._wrap(np.floor(i + 0.5), width)
+            # Rows are counted from the top here, but a place between two belongs to the lower v as in Blender.
+            row, column = self._wrap(np.ceil(j + 0.5) - 1, height), self._wrap(np.floor(i + 0.5), width)
             color = _at(pixels, row * width + column).astype(np.float64)
         else:
             i0, j0 = np.floor(i), np.floor(j)
@@ -74,7 +76,7 @@ class Texture:
         if self.pixels.dtype == np.uint8:
             color /= 255
         if self.extension == "clip":
-            color[(uv < 0).any(axis=1) | (uv > 1).any(axis=1)] = 0
+            color[(uv < -EDGE).any(axis=1) | (uv > 1 + EDGE).any(axis=1)] = 0
         return color
 
     def _wrap(self, index: NDArray[np.float64], size: int) -> NDArray[np.int64]:

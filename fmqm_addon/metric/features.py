@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The four similarities of one patch (V-E). Positions and distances are in patch diagonals L here.
+"""The four similarities of a patch (V-E). Positions and distances are in patch diagonals L here.
 
 Equal inputs cancel exactly: sa sb is sqrt(va vb) with variances, a squared cosine is
 (a.b)^2 / (a.a b.b); a patch against itself scores 1, not nearly 1.
@@ -19,45 +19,60 @@ from .spatial import Floats, Ints, dot
 EPSILON_SDF = 1e-12  # V-E1: decides 0/0 as 1
 EPSILON_COLOR = 1e-10  # V-E3: the same
 EPSILON_GRADIENT = 1e-10  # V-E4: the paper's epsilon
-ROUGH = 1e-5  # in L^2: far above float32 rounding of squared distances within a patch
+ROUGH = 1e-5  # relative to the patch: far above float32 rounding of squared distances
 SAME_COLOR = 1e-6  # V-E4: color differences up to this count as none
 
 
 @dataclass(frozen=True)
-class PatchField:
-    """One mesh's fields over the n samples of a patch: nearest (n, 3), sdf (n,), channels (n, C)."""
+class FieldValues:
+    """One mesh's fields at n samples: nearest (n, 3) and sdf (n,) in patch diagonals, channels (n, C)."""
 
     nearest: Floats
     sdf: Floats
     channels: Floats
 
 
-def patch_features(
-    positions: Floats, ref: PatchField, dist: PatchField, units: Ints, weights: Floats, settings: Settings
-) -> tuple[float, float, float, float]:
-    """geoSSIM, geoGraSSIM, colorSSIM, colorGraSSIM of a patch, each in [0, 1].
+def features_of_patches(
+    positions: Floats,
+    start: Ints,
+    ref: FieldValues,
+    dist: FieldValues,
+    units: Ints,
+    weights: Floats,
+    settings: Settings,
+) -> Floats:
+    """(G, 4) geoSSIM, geoGraSSIM, colorSSIM, colorGraSSIM of some patches, each in [0, 1].
+
+    Several patches at once share the cost of numpy's calls; none looks at another's samples.
 
     Args:
-        positions: (n, 3) samples. units: indices of the drawn color units. weights: (C,) of the channels.
+        positions: (n, 3) samples, patch after patch, each in its own patch's diagonals.
+        start: (G + 1,) patch k is start[k] : start[k + 1].
+        units: ascending indices of the drawn color units. weights: (C,) of the channels.
     """
-    pairs = find_pairs(positions, units, settings.radius)
-    along = unit_cosine(pairs, units, ref.nearest - positions)
+    to_ref, to_dist = ref.nearest - positions, dist.nearest - positions
+    pairs = _pairs_of_patches(positions, start, units, settings.radius)
+    along = unit_cosine(pairs, units, to_ref)
     normal = similarity_of_units(pairs.pick(along > settings.normal_threshold), units, ref, dist)
     tangent = similarity_of_units(pairs.pick(along < settings.tangent_threshold), units, ref, dist)
-    color_ssim = np.sqrt(_pool(normal.mean(axis=1), weights) * _pool(tangent.mean(axis=1), weights))
 
     if settings.gradient_radius != settings.radius:
-        pairs = find_pairs(positions, units, settings.gradient_radius)
-        along = unit_cosine(pairs, units, ref.nearest - positions)
-    ref_gradient = color_gradient(pairs.pick(along < settings.tangent_threshold), units, ref.channels)
-    along = unit_cosine(pairs, units, dist.nearest - positions)
-    dist_gradient = color_gradient(pairs.pick(along < settings.tangent_threshold), units, dist.channels)
-    return (
-        geometry_similarity(ref.sdf, dist.sdf),
-        geometry_gradient_similarity(positions, ref.nearest, dist.nearest),
-        float(color_ssim),
-        gradient_similarity(ref_gradient, dist_gradient, weights),
-    )
+        pairs = _pairs_of_patches(positions, start, units, settings.gradient_radius)
+        along = unit_cosine(pairs, units, to_ref)
+    gradient_r = color_gradient(pairs.pick(along < settings.tangent_threshold), units, ref.channels)
+    along = unit_cosine(pairs, units, to_dist)
+    gradient_d = color_gradient(pairs.pick(along < settings.tangent_threshold), units, dist.channels)
+
+    features = np.empty((len(start) - 1, 4))
+    for k, drawn in enumerate(_slices(np.searchsorted(units, start))):
+        here = slice(start[k], start[k + 1])
+        features[k] = (
+            geometry_similarity(ref.sdf[here], dist.sdf[here]),
+            geometry_gradient_similarity(to_ref[here], to_dist[here]),
+            np.sqrt(_pool(normal[:, drawn].mean(axis=1), weights) * _pool(tangent[:, drawn].mean(axis=1), weights)),
+            gradient_similarity(gradient_r.of(drawn), gradient_d.of(drawn), weights),
+        )
+    return features
 
 
 def similarity(mean_r: Any, mean_d: Any, var_r: Any, var_d: Any, cov: Any, epsilon: float) -> Any:
@@ -76,12 +91,13 @@ def geometry_similarity(sdf_r: Floats, sdf_d: Floats) -> float:
     return float(similarity(mean_r, mean_d, np.mean(r * r), np.mean(d * d), np.mean(r * d), EPSILON_SDF))
 
 
-def geometry_gradient_similarity(positions: Floats, nearest_r: Floats, nearest_d: Floats) -> float:
-    """Equation (23): root mean squared cosine of the SDF gradients; the sign of the SDF squares away.
+def geometry_gradient_similarity(to_ref: Floats, to_dist: Floats) -> float:
+    """Equation (23): root mean squared cosine of the SDF gradients; their signs square away.
 
-    A sample on either surface counts 1.
+    Args:
+        to_ref, to_dist: (n, 3) p_n - p. A sample on either surface counts 1.
     """
-    return float(np.sqrt(np.mean(_squared_cosine(positions - nearest_r, positions - nearest_d, 1.0))))
+    return float(np.sqrt(np.mean(_squared_cosine(to_ref, to_dist, 1.0))))
 
 
 @dataclass(frozen=True)
@@ -116,10 +132,24 @@ def find_pairs(positions: Floats, units: Ints, radius: float) -> Pairs:
     squares, ones = x * x + y * y + z * z, np.ones(len(positions), np.float32)
     of_units = np.stack([-2 * x, -2 * y, -2 * z, squares, ones])[:, units].copy()  # einsum is slow on strides
     squared = np.einsum("ku,kn->un", of_units, np.stack([x, y, z, ones, squares]))
-    row, other = np.divmod(np.flatnonzero(squared < radius * radius + ROUGH), len(positions))
+    row, other = np.divmod(np.flatnonzero(squared < radius * radius + ROUGH * max(1.0, squares.max())), len(positions))
     offset = positions.take(other, axis=0) - positions.take(units.take(row), axis=0)
     distance = np.sqrt(dot(offset, offset))
     return Pairs(row, other, offset, distance).pick((distance > 0) & (distance < radius))
+
+
+def _pairs_of_patches(positions: Floats, start: Ints, units: Ints, radius: float) -> Pairs:
+    """The pairs within each patch, indexed among all samples and all units."""
+    parts = []
+    for here, drawn in zip(_slices(start), _slices(np.searchsorted(units, start)), strict=True):
+        part = find_pairs(positions[here], units[drawn] - here.start, radius)
+        parts.append((part.row + drawn.start, part.other + here.start, part.offset, part.distance))
+    return Pairs(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+
+
+def _slices(start: Ints) -> list[slice]:
+    bounds = start.tolist()
+    return [slice(first, last) for first, last in zip(bounds[:-1], bounds[1:], strict=True)]
 
 
 def unit_cosine(pairs: Pairs, units: Ints, towards: Floats) -> Floats:
@@ -134,7 +164,7 @@ def unit_cosine(pairs: Pairs, units: Ints, towards: Floats) -> Floats:
     return np.abs(dot(axis.take(pairs.row, axis=0), pairs.offset)) / pairs.distance
 
 
-def similarity_of_units(pairs: Pairs, units: Ints, ref: PatchField, dist: PatchField) -> NDArray[np.float64]:
+def similarity_of_units(pairs: Pairs, units: Ints, ref: FieldValues, dist: FieldValues) -> NDArray[np.float64]:
     """(C, units) equations (24) to (27) over each unit: p itself and the p' of its pairs.
 
     Colors are taken relative to p's, so that the moments of a nearly plain unit do not cancel.
@@ -161,6 +191,9 @@ class Gradient:
 
     magnitude: Floats
     step: Floats
+
+    def of(self, units: slice) -> Gradient:
+        return Gradient(self.magnitude[:, units], self.step[:, units])
 
 
 def color_gradient(pairs: Pairs, units: Ints, channels: Floats) -> Gradient:

@@ -18,7 +18,6 @@ SPLIT_BELOW = 4  # V-B: once split, no triangle is above S_global / (SPLIT_BELOW
 AREA_ROUNDING = 1e-9  # relative: an area that reaches its target up to rounding has reached it
 
 _FPS_BLOCK = 256  # vertices that share a bounding box in farthest point sampling
-_RANDOM_CENTERS_STREAM = 1  # keeps this random stream apart from the patches' own
 
 
 @dataclass(frozen=True)
@@ -127,7 +126,7 @@ def choose_centers(vertices: Floats, settings: Settings) -> Ints:
     count = min(settings.patches, len(vertices))
     scored = count if settings.scored_patches is None else min(settings.scored_patches, count)
     if settings.centers == "random":
-        rng = np.random.default_rng([_RANDOM_CENTERS_STREAM, settings.seed])
+        rng = np.random.default_rng(np.random.SeedSequence(settings.seed, spawn_key=(0,)))
         return rng.choice(len(vertices), count, replace=False)[:scored]
     return farthest_points(vertices, scored)
 

@@ -14,7 +14,7 @@ from .spatial import Floats, Ints
 from .surface import triangle_normals
 
 PATCH_CAP = 1.1  # V-C: no patch takes more than this many times its even share of the samples
-COUNT_ROUNDING = 1e-9  # a count that reaches a whole number up to rounding has reached it
+COUNT_ROUNDING = 1e-6  # a count that reaches a whole number up to rounding has reached it
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ def draw_samples(mesh: PatchMesh, patch: Patch, total_area: float, settings: Set
     expected = np.cumsum(mesh.areas[patch.faces])
     expected *= count / expected[-1]
     expected[-1] = count
-    upto = np.floor(expected + rng.random()).astype(np.int64)
+    upto = np.minimum(np.floor(expected + rng.random()).astype(np.int64), count)
     face = np.repeat(patch.faces, np.diff(upto, prepend=0))
 
     root, second = np.sqrt(rng.random(count)), rng.random(count)

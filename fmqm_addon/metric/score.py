@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from .color import channel_weights, channels
 from .errors import MeshError
-from .features import PatchField, patch_features, pool_features
+from .features import FieldValues, features_of_patches, pool_features
 from .fields import Fields, evaluate_fields
 from .patches import Patch, PatchMesh, build_patch_mesh, choose_centers, grow_patches
 from .samples import Samples, draw_samples, join_samples
@@ -29,6 +29,8 @@ from .spatial import Floats, Ints, morton_order
 from .surface import Frame, Surface
 
 COLUMNS = ("geoSSIM", "geoGraSSIM", "colorSSIM", "colorGraSSIM", "FMQM")
+
+_PATCHES_AT_ONCE = 8  # some milliseconds of work
 
 T = TypeVar("T")
 
@@ -53,19 +55,22 @@ class Stepper(Generic[T]):
 
     def __init__(self, work: Work[T]) -> None:
         self._work = work
+        self._done = False
         self.progress = Progress("", 0.0)
         self.seconds: dict[str, float] = {}
         self.result: T
 
     def step(self) -> bool:
         """Do a little; True while there is more to do."""
+        if self._done:
+            return False
         began = time.perf_counter()
         more = True
         try:
             self.progress = next(self._work)
         except StopIteration as end:
             self.result = end.value
-            more = False
+            self._done, more = True, False
         stage = self.progress.stage
         self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - began
         return more
@@ -77,6 +82,7 @@ class Stepper(Generic[T]):
 
     def cancel(self) -> None:
         self._work.close()
+        self._done = True
 
 
 @dataclass(frozen=True)
@@ -176,18 +182,23 @@ class Evaluation:
         dist = yield from _evaluate(distorted, samples, prepared.order, None, 0.0, 0.8)
         weights = channel_weights(settings.color_space)
         channels_r, channels_d = (channels(field.ncf, settings.color_space) for field in (prepared.ref, dist))
+        diagonals = np.array([patch.diagonal for patch in prepared.patches])
         features = np.empty((len(prepared.patches), 4))
-        for k, patch in enumerate(prepared.patches):
-            here = slice(samples.start[k], samples.start[k + 1])
-            features[k] = patch_features(
-                samples.positions[here] / patch.diagonal,
-                _patch_field(prepared.ref, channels_r, here, patch.diagonal),
-                _patch_field(dist, channels_d, here, patch.diagonal),
+        for first in range(0, len(features), _PATCHES_AT_ONCE):
+            group = slice(first, first + _PATCHES_AT_ONCE)
+            start = samples.start[first : first + _PATCHES_AT_ONCE + 1]
+            here = slice(start[0], start[-1])
+            diagonal = np.repeat(diagonals[group], np.diff(start))  # lengths are in patch diagonals from here on
+            features[group] = features_of_patches(
+                samples.positions[here] / diagonal[:, None],
+                start - start[0],
+                _in_diagonals(prepared.ref, channels_r, here, diagonal),
+                _in_diagonals(dist, channels_d, here, diagonal),
                 np.flatnonzero(samples.unit[here]),
                 weights,
                 settings,
             )
-            yield Progress("features", 0.8 + 0.2 * (k + 1) / len(prepared.patches))
+            yield Progress("features", 0.8 + 0.2 * min(first + _PATCHES_AT_ONCE, len(features)) / len(features))
         patch_scores = np.column_stack([features, pool_features(features, settings.pooling)])
         return Result(
             settings=settings,
@@ -217,5 +228,5 @@ def _evaluate(
         yield Progress("fields", first + (last - first) * done)
 
 
-def _patch_field(fields: Fields, values: Floats, here: slice, diagonal: float) -> PatchField:
-    return PatchField(fields.nearest[here] / diagonal, fields.sdf[here] / diagonal, values[here])
+def _in_diagonals(fields: Fields, values: Floats, here: slice, diagonal: Floats) -> FieldValues:
+    return FieldValues(fields.nearest[here] / diagonal[:, None], fields.sdf[here] / diagonal, values[here])

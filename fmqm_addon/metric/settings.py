@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass, fields, replace
+from numbers import Integral
 from typing import Any
 
 from .errors import SettingsError
@@ -55,6 +56,10 @@ class Settings:
     seed: int = 0
 
     def __post_init__(self) -> None:
+        for name in ("samples", "patches", "color_units", "seed", "scored_patches"):
+            value = getattr(self, name)
+            whole = isinstance(value, Integral) or (value is None and name == "scored_patches")
+            _require(whole, name, value, "a whole number")
         for name in ("samples", "patches", "color_units"):
             _require(getattr(self, name) >= 1, name, getattr(self, name), "at least 1")
         if self.scored_patches is not None:

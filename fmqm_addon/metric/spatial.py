@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+NEEDLE = 1e-8  # sine of a triangle's angle below which rounding decides its plane; its edges remain
 _MORTON_BITS = 10
 
 
@@ -57,7 +58,8 @@ def closest_on_triangles(points: Floats, a: Floats, b: Floats, c: Floats) -> tup
     beta = dot(cross(ap, ac), normal) / squared
     gamma = dot(cross(ab, ap), normal) / squared
     weights = np.stack([1 - beta - gamma, beta, gamma], axis=1)
-    outside = np.flatnonzero((weights < 0).any(axis=1))
+    needle = squared < NEEDLE * NEEDLE * dot(ab, ab) * dot(ac, ac)
+    outside = np.flatnonzero((weights < 0).any(axis=1) | needle)
     if outside.size:
         weights[outside] = _closest_on_edges(points[outside], a[outside], b[outside], c[outside])
     return weights[:, :1] * a + weights[:, 1:2] * b + weights[:, 2:] * c, weights

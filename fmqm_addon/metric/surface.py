@@ -75,7 +75,7 @@ class Surface:
     Attributes:
         vertices: (V, 3) float64 in the metric's frame; no two are equal, each is used.
         triangles: (T, 3) int64; none is degenerate, none repeats another.
-        uv: (T, 3, 2) float64; material: (T,) int64; colors: as in MeshArrays.
+        uv: (T, 3, 2) float64, finite; material: (T,) int64; colors: as in MeshArrays.
         source: (T,) int64, the row of each triangle in MeshArrays.
     """
 
@@ -129,19 +129,22 @@ def prepare_surface(mesh: MeshArrays, build_query: QueryBuilder, frame: Frame | 
         warnings.append(f"{mesh.name}: {dropped} of {len(mesh.triangles)} triangles left out: they {why}")
         triangles, source = triangles[mask], source[mask]
 
-    finite = np.isfinite(mesh.positions).all(axis=1)
+    world = np.asarray(mesh.positions, np.float64)
+    finite = np.isfinite(world).all(axis=1)
     keep(finite[triangles].all(axis=1), "have coordinates that are not finite")
-    positions, triangles = weld(np.where(finite[:, None], mesh.positions, 0.0), triangles)
-    keep(~_is_flat(positions, triangles), "have zero area")
-    keep(_is_first(triangles), "repeat another triangle")
-
-    used, compact = np.unique(triangles, return_inverse=True)
-    positions, triangles = positions[used], compact.reshape(-1, 3)
+    world, triangles = _used_only(world, triangles)
     if frame is None:
-        low, high = positions.min(axis=0), positions.max(axis=0)
-        frame = Frame(low + (high - low) / 2, float(np.linalg.norm(high - low)))
-    vertices = frame.enter(positions)
+        frame = _frame_of(world, mesh.name)
+    positions, triangles = weld(frame.enter(world), triangles)
+    keep(~_is_flat(positions, triangles, frame), "have zero area")
+    keep(_is_first(triangles), "repeat another triangle")
+    vertices, triangles = _used_only(positions, triangles)
+
     uv = np.asarray(mesh.uv, np.float64)[source]
+    strange = ~np.isfinite(uv).all(axis=(1, 2))
+    if strange.any():
+        warnings.append(f"{mesh.name}: {np.count_nonzero(strange)} triangles have UVs that are not finite; taken as 0")
+        uv[strange] = np.where(np.isfinite(uv[strange]), uv[strange], 0.0)
     return Surface(
         name=mesh.name,
         frame=frame,
@@ -156,19 +159,33 @@ def prepare_surface(mesh: MeshArrays, build_query: QueryBuilder, frame: Frame | 
     )
 
 
-def weld(positions: Floats, triangles: Ints) -> tuple[Floats, Ints]:
-    """Vertices at equal positions become one.
+def _used_only(positions: Floats, triangles: Ints) -> tuple[Floats, Ints]:
+    used = np.zeros(len(positions), bool)
+    used[triangles] = True
+    return positions[used], (np.cumsum(used) - 1)[triangles]
 
-    The welded vertices are numbered by position (x, then y, then z), so that what depends on vertex
-    numbers, such as ties in farthest point sampling, does not depend on the order in a file.
-    """
-    order = np.lexsort(positions.T[::-1])
+
+def _frame_of(positions: Floats, name: str) -> Frame:
+    low, high = positions.min(axis=0), positions.max(axis=0)
+    diagonal = float(np.linalg.norm(high - low))
+    if not 0 < diagonal < np.inf:
+        raise MeshError(f"{name}: all vertices lie at one place, so that the surface has zero area")
+    return Frame(low + (high - low) / 2, diagonal)
+
+
+def weld(positions: Floats, triangles: Ints) -> tuple[Floats, Ints]:
+    """Vertices at equal positions become one; the first of them keeps its place in the order."""
+    order = np.lexsort(positions.T)  # stable: of equal positions the first comes first
     ordered = positions[order]
     new = np.ones(len(order), bool)
     new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
-    which = np.empty(len(order), np.int64)
-    which[order] = np.cumsum(new) - 1
-    return ordered[new], which[triangles]
+    first = order[new]
+    by_place = np.argsort(first)
+    rank = np.empty_like(by_place)
+    rank[by_place] = np.arange(len(by_place))
+    which = np.empty_like(order)
+    which[order] = rank[np.cumsum(new) - 1]
+    return positions[first[by_place]], which[triangles]
 
 
 def triangle_areas(vertices: Floats, triangles: Ints) -> Floats:
@@ -186,12 +203,12 @@ def _area_vectors(vertices: Floats, triangles: Ints) -> Floats:
     return cross(b - a, c - a)
 
 
-def _is_flat(positions: Floats, triangles: Ints) -> NDArray[np.bool_]:
-    """Zero area, up to the rounding that the positions already carry."""
+def _is_flat(positions: Floats, triangles: Ints, frame: Frame) -> NDArray[np.bool_]:
+    """Zero area, up to the rounding that the positions carry from their place in the world."""
     a, b, c = (positions[triangles[:, k]] for k in range(3))
     ab, ac, bc = b - a, c - a, c - b
     longest = np.sqrt(np.maximum(np.maximum(dot(ab, ab), dot(ac, ac)), dot(bc, bc)))
-    reach = np.abs(positions).max(axis=1)[triangles].max(axis=1)
+    reach = np.abs(positions).max(axis=1)[triangles].max(axis=1) + np.abs(frame.center).max() / frame.scale
     height_times_longest = np.linalg.norm(cross(ab, ac), axis=1)
     rounding = FLAT_ROUNDINGS * np.finfo(np.float64).eps * reach
     welded_away = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)

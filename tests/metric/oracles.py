@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fmqm_addon.metric.color import Texture
-from fmqm_addon.metric.features import PatchField
+from fmqm_addon.metric.features import FieldValues
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.spatial import Floats, Ints
 
@@ -133,9 +133,9 @@ def winding_number(point: Floats, vertices: Floats, triangles: Ints) -> float:
 
 
 def weld_with_dict(positions: Floats, triangles: Ints) -> tuple[list[tuple[float, ...]], list[list[int]]]:
-    """Equal positions are one vertex; the vertices are numbered by x, then y, then z."""
+    """Equal positions are one vertex; the first of them keeps its place in the order."""
     rows = [tuple(float(x) for x in row) for row in positions]
-    number = {row: k for k, row in enumerate(sorted(set(rows)))}
+    number = {row: k for k, row in enumerate(dict.fromkeys(rows))}
     return list(number), [[number[rows[v]] for v in triangle] for triangle in triangles.tolist()]
 
 
@@ -199,7 +199,7 @@ def grow_with_sets(
 def texture_color(texture: Texture, u: float, v: float) -> list[float]:
     """One lookup, in exact rational arithmetic: i = u W - 0.5, j = (1 - v) H - 0.5, four pixels."""
     height, width = texture.pixels.shape[:2]
-    if texture.extension == "clip" and not (0 <= u <= 1 and 0 <= v <= 1):
+    if texture.extension == "clip" and not (-1e-9 <= u <= 1 + 1e-9 and -1e-9 <= v <= 1 + 1e-9):
         return [0.0, 0.0, 0.0]
     i, j = Fraction(u) * width - Fraction(1, 2), (1 - Fraction(v)) * height - Fraction(1, 2)
 
@@ -216,7 +216,7 @@ def texture_color(texture: Texture, u: float, v: float) -> list[float]:
         return [Fraction(float(x)) / full for x in texture.pixels[wrap(row, height), wrap(column, width)]]
 
     if texture.interpolation == "closest":
-        return [float(x) for x in pixel(math.floor(i + Fraction(1, 2)), math.floor(j + Fraction(1, 2)))]
+        return [float(x) for x in pixel(math.floor(i + Fraction(1, 2)), math.ceil(j + Fraction(1, 2)) - 1)]
     left, top = math.floor(i), math.floor(j)
     color = [Fraction(0)] * 3
     for column, row, weight in (
@@ -304,7 +304,7 @@ def gradient_cosines(positions: Floats, nearest_r: Floats, nearest_d: Floats) ->
 
 
 def features_by_loop(
-    positions: Floats, ref: PatchField, dist: PatchField, units: Ints, weights: Floats, settings: Settings
+    positions: Floats, ref: FieldValues, dist: FieldValues, units: Ints, weights: Floats, settings: Settings
 ) -> list[float]:
     """METRIC "Four features of a patch", sentence by sentence; lengths in patch diagonals."""
     normal: list[float] = []
@@ -317,7 +317,7 @@ def features_by_loop(
             s = [s_of(ref.channels[members, c].tolist(), dist.channels[members, c].tolist(), 1e-10) for c in range(3)]
             into.append(weighted_mean(s, weights))
 
-    def gradients(field: PatchField) -> list[list[tuple[float, Floats]]]:
+    def gradients(field: FieldValues) -> list[list[tuple[float, Floats]]]:
         towards, radius, below = field.nearest - positions, settings.gradient_radius, settings.tangent_threshold
         members = {unit: unit_members(positions, towards, unit, radius, below=below) for unit in units.tolist()}
         return [[steepest(positions, field.channels[:, c], unit, members[unit]) for unit in members] for c in range(3)]

@@ -203,7 +203,6 @@ def test_joined_samples_are_patch_after_patch() -> None:
         assert np.flatnonzero(joined.unit[here]).tolist() == part.units.tolist()
 
 
-@pytest.mark.xfail(strict=True, reason="a count whole up to the rounding far from the origin falls by one")
 def test_counts_are_the_same_far_from_the_origin() -> None:
     """On a regular grid each share is a whole number; 1e5 diagonals away it is one up to 1e-7."""
     positions, triangles = grid(100, 100)

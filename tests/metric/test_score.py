@@ -15,7 +15,7 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from fmqm_addon.metric.color import PlainColor, Texture, channels
-from fmqm_addon.metric.features import PatchField, find_pairs, pool_features, unit_cosine
+from fmqm_addon.metric.features import FieldValues, find_pairs, pool_features, unit_cosine
 from fmqm_addon.metric.score import COLUMNS, Evaluation, Progress, Result, Stepper
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.surface import MeshArrays, prepare_surface
@@ -248,7 +248,7 @@ def test_the_patch_table_follows_from_the_saved_fields(color_space: str, radius:
     for k, patch in enumerate(result.patches):
         here = slice(samples.start[k], samples.start[k + 1])
         ref, dist = (
-            PatchField(
+            FieldValues(
                 fields.nearest[here] / patch.diagonal,
                 fields.sdf[here] / patch.diagonal,
                 channels(fields.ncf[here], color_space),
@@ -274,9 +274,6 @@ def test_scaled_and_moved_pairs_score_the_same(scale: float, diagonals: float) -
     np.testing.assert_allclose(there.scores, here.scores, rtol=0, atol=2e-3)
 
 
-@pytest.mark.xfail(
-    strict=True, reason="vertices are numbered by exact position; numbers decide ties and random streams"
-)
 @pytest.mark.parametrize("diagonals", [1e3, 1e5])
 def test_moved_regular_meshes_keep_their_patches(diagonals: float) -> None:
     """Rows that are level only up to rounding: that must not decide which vertex is which."""
@@ -342,7 +339,7 @@ def pair_counts(settings: Settings) -> tuple[int, int, int]:
 def test_radius_and_thresholds_choose_the_members() -> None:
     every, normal, tangent = pair_counts(SMALL)
     assert pair_counts(replace(SMALL, radius=0.25))[0] > every
-    assert pair_counts(replace(SMALL, normal_threshold=0.99))[1] < normal
+    assert pair_counts(replace(SMALL, normal_threshold=0.5))[1] > normal
     assert pair_counts(replace(SMALL, tangent_threshold=0.2))[2] > tangent
 
 
@@ -476,7 +473,6 @@ def test_a_stepper_steps_and_ends_with_its_result() -> None:
     assert stepper.result == 7
 
 
-@pytest.mark.xfail(strict=True, reason="a finished generator ends again, with None")
 def test_a_result_stays() -> None:
     stepper = Stepper(counting())
     stepper.run()

@@ -46,7 +46,6 @@ def test_closest_point_is_the_nearest_of_the_triangle(seed: int, exponent: float
     check_closest(point, corners, 1e-11)
 
 
-@pytest.mark.xfail(strict=True, reason="plane weights of a sliver lose all digits; its edges would be nearer")
 def test_closest_point_of_the_thinnest_slivers() -> None:
     rng = np.random.default_rng(0)
     for _ in range(200):
