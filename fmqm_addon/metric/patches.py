@@ -172,6 +172,7 @@ def grow_patches(mesh: PatchMesh, centers: Ints, n_patches: int) -> Iterator[Pat
     incident, start = _incident_faces(mesh)
     seen_face = np.full(len(mesh.triangles), -1)
     seen_vertex = np.full(len(mesh.vertices), -1)
+    scratch = np.empty(max(len(seen_face), len(seen_vertex)), np.int64)
     centroids: Floats | None = None
     target = mesh.area / n_patches * (1 - AREA_ROUNDING)
     for number, center in enumerate(centers.tolist()):
@@ -181,19 +182,21 @@ def grow_patches(mesh: PatchMesh, centers: Ints, n_patches: int) -> Iterator[Pat
         seen_vertex[center] = number
         while area < target and frontier.size:
             faces = _gather(incident, start, frontier)
-            faces = np.unique(faces[seen_face[faces] != number])
+            faces = _once(faces[seen_face[faces] != number], scratch)
             seen_face[faces] = number
             rings.append(faces)
             area += float(mesh.areas[faces].sum())
             around = mesh.triangles[faces].ravel()
-            frontier = np.unique(around[seen_vertex[around] != number])
+            frontier = _once(around[seen_vertex[around] != number], scratch)
             seen_vertex[frontier] = number
         extended = area < target
         if extended:
             if centroids is None:
                 centroids = mesh.vertices[mesh.triangles].mean(axis=1)
             rest = np.flatnonzero(seen_face != number)
-            rings.append(_nearest_faces(centroids[rest], mesh.vertices[center], mesh.areas[rest], target - area, rest))
+            offset = centroids - mesh.vertices[center]
+            squared = dot(offset, offset)
+            rings.append(rest[_nearest(squared[rest], mesh.areas[rest], target - area)])
         patch_faces = np.sort(np.concatenate(rings))
         corners = mesh.vertices[mesh.triangles[patch_faces].ravel()]
         yield Patch(
@@ -221,16 +224,22 @@ def _gather(values: Ints, start: Ints, rows: Ints) -> Ints:
     return values[np.arange(ends[-1]) + np.repeat(start[rows] - ends + counts, counts)]
 
 
-def _nearest_faces(centroids: Floats, center: Floats, areas: Floats, wanted: float, faces: Ints) -> Ints:
-    """The nearest of the faces whose areas together reach the wanted area; all if they never do."""
-    offset = centroids - center
-    squared = dot(offset, offset)
-    few = min(64, len(squared))
-    while True:  # sort only as many of the nearest as are needed
-        near = np.argpartition(squared, few - 1)[:few]
-        near = np.flatnonzero(squared <= squared[near].max())  # with all that tie
-        near = near[np.argsort(squared[near], kind="stable")]
-        total = np.cumsum(areas[near])
-        if total[-1] >= wanted or len(near) == len(squared):
-            return faces[near[: int(np.searchsorted(total, wanted)) + 1]]
-        few = min(8 * few, len(squared))
+def _once(values: Ints, scratch: Ints) -> Ints:
+    """Each of the values once, without sorting; scratch is any array that they index."""
+    place = np.arange(len(values))
+    scratch[values] = place
+    return values[scratch[values] == place]
+
+
+def _nearest(squared: Floats, areas: Floats, wanted: float) -> Ints:
+    """The rows of least squared distance whose areas together reach the wanted area; all if they never do."""
+    farthest = squared.max(initial=0.0)
+    reach = wanted
+    while True:  # sort no more of them than are needed
+        near = np.flatnonzero(squared <= reach)
+        if reach >= farthest or float(areas[near].sum()) >= wanted:
+            break
+        reach *= 4
+    near = near[np.argsort(squared[near], kind="stable")]
+    total = np.cumsum(areas[near])
+    return near[: int(np.searchsorted(total, wanted)) + 1]

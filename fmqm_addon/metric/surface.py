@@ -48,6 +48,11 @@ class Frame:
     center: Floats
     scale: float
 
+    @property
+    def offset(self) -> float:
+        """How far from the world's origin the frame lies, in its own units: what float64 rounds off there."""
+        return float(np.abs(self.center).max() / self.scale)
+
     def enter(self, world: Floats) -> Floats:
         return (world - self.center) / self.scale
 
@@ -130,8 +135,9 @@ def prepare_surface(mesh: MeshArrays, build_query: QueryBuilder, frame: Frame | 
         triangles, source = triangles[mask], source[mask]
 
     world = np.asarray(mesh.positions, np.float64)
-    finite = np.isfinite(world).all(axis=1)
-    keep(finite[triangles].all(axis=1), "have coordinates that are not finite")
+    if not np.isfinite(world).all():
+        finite = np.isfinite(world).all(axis=1)
+        keep(finite[triangles].all(axis=1), "have coordinates that are not finite")
     world, triangles = _used_only(world, triangles)
     if frame is None:
         frame = _frame_of(world, mesh.name)
@@ -141,10 +147,10 @@ def prepare_surface(mesh: MeshArrays, build_query: QueryBuilder, frame: Frame | 
     vertices, triangles = _used_only(positions, triangles)
 
     uv = np.asarray(mesh.uv, np.float64)[source]
-    strange = ~np.isfinite(uv).all(axis=(1, 2))
-    if strange.any():
-        warnings.append(f"{mesh.name}: {np.count_nonzero(strange)} triangles have UVs that are not finite; taken as 0")
-        uv[strange] = np.where(np.isfinite(uv[strange]), uv[strange], 0.0)
+    if not np.isfinite(uv).all():
+        strange = np.count_nonzero(~np.isfinite(uv).all(axis=(1, 2)))
+        warnings.append(f"{mesh.name}: {strange} triangles have UVs that are not finite; taken as 0")
+        uv = np.where(np.isfinite(uv), uv, 0.0)
     return Surface(
         name=mesh.name,
         frame=frame,
@@ -175,6 +181,9 @@ def _frame_of(positions: Floats, name: str) -> Frame:
 
 def weld(positions: Floats, triangles: Ints) -> tuple[Floats, Ints]:
     """Vertices at equal positions become one; the first of them keeps its place in the order."""
+    x, y, z = (positions + 0.0).T.copy().view(np.uint64)  # + 0.0: -0 and 0 are equal
+    if _distinct(_mix(_mix(_mix(x) ^ y) ^ z)):
+        return positions, triangles
     order = np.lexsort(positions.T)  # stable: of equal positions the first comes first
     ordered = positions[order]
     new = np.ones(len(order), bool)
@@ -205,30 +214,39 @@ def _area_vectors(vertices: Floats, triangles: Ints) -> Floats:
 
 def _is_flat(positions: Floats, triangles: Ints, frame: Frame) -> NDArray[np.bool_]:
     """Zero area, up to the rounding that the positions carry from their place in the world."""
-    a, b, c = (positions[triangles[:, k]] for k in range(3))
-    ab, ac, bc = b - a, c - a, c - b
-    longest = np.sqrt(np.maximum(np.maximum(dot(ab, ab), dot(ac, ac)), dot(bc, bc)))
-    reach = np.abs(positions).max(axis=1)[triangles].max(axis=1) + np.abs(frame.center).max() / frame.scale
-    height_times_longest = np.linalg.norm(cross(ab, ac), axis=1)
-    rounding = FLAT_ROUNDINGS * np.finfo(np.float64).eps * reach
-    welded_away = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)
-    return welded_away | (height_times_longest <= rounding * longest)
+    a, b, c = (positions.take(triangles[:, k], axis=0) for k in range(3))
+    b -= a
+    c -= a
+    normal = cross(b, c)
+    longest = np.maximum(dot(b, b), dot(c, c))  # of the two edges, squared: within a factor of the longest
+    rounding = FLAT_ROUNDINGS * np.finfo(np.float64).eps * float(np.abs(positions).max() + frame.offset)
+    return dot(normal, normal) <= rounding * rounding * longest
 
 
 def _is_first(triangles: Ints) -> NDArray[np.bool_]:
-    """False where an earlier triangle has the same three vertices in any order.
-
-    Sorting one 64-bit mix of the three is several times faster than sorting rows; where two different
-    rows share it, the rows themselves are sorted.
-    """
-    rows = np.sort(triangles, axis=1)
-    mix = np.zeros(len(rows), np.uint64)
-    for column in rows.view(np.uint64).T:
-        mix = (mix ^ column) * np.uint64(0x9E3779B97F4A7C15)
-        mix ^= mix >> np.uint64(29)
-    _, first, which = np.unique(mix, return_index=True, return_inverse=True)
-    if not np.array_equal(rows[first][which], rows):
-        _, first, which = np.unique(rows, axis=0, return_index=True, return_inverse=True)
-        which = which.reshape(-1)
-    is_first: NDArray[np.bool_] = first[which] == np.arange(len(rows))
+    """False where an earlier triangle has the same three vertices in any order."""
+    corners = _mix(np.arange(triangles.max() + 1, dtype=np.uint64))
+    a, b, c = (corners.take(triangles[:, k]) for k in range(3))
+    keys = a + b + c  # the same in any order
+    is_first = np.ones(len(triangles), bool)
+    if _distinct(keys):
+        return is_first
+    _, which, count = np.unique(keys, return_inverse=True, return_counts=True)
+    suspects = np.flatnonzero(count[which] > 1)
+    _, first = np.unique(np.sort(triangles[suspects], axis=1), axis=0, return_index=True)
+    is_first[suspects] = False
+    is_first[suspects[first]] = True
     return is_first
+
+
+def _mix(bits: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """Spreads 64-bit values over all of their range (the finalizer of splitmix64)."""
+    mixed = (bits ^ (bits >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return mixed ^ (mixed >> np.uint64(31))
+
+
+def _distinct(keys: NDArray[np.uint64]) -> bool:
+    """No two are equal: then nothing that they are made of can be. Much faster than sorting rows."""
+    ordered = np.sort(keys)
+    return not (ordered[1:] == ordered[:-1]).any()
