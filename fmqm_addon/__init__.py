@@ -5,8 +5,14 @@ VERSION = "0.1.0"
 
 
 def register() -> None:
-    """Nothing to show in Blender's window yet: the scores come from scripts/score.py."""
+    """Shows the add-on in Blender. Imported here, so that scripts and tests of the metric load no panels."""
+    from . import ui
+
+    ui.register()
 
 
 def unregister() -> None:
     """Leaves nothing behind."""
+    from . import ui
+
+    ui.unregister()

@@ -17,7 +17,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -44,39 +44,47 @@ def main() -> int:
     parser.add_argument(
         "--growth", action="store_true", help="generated surfaces of 10 thousand to 1 million triangles"
     )
-    parser.add_argument("--samples", action="store_true", help="generated surface at 50, 100 and 200 thousand samples")
+    parser.add_argument(
+        "--samples", action="store_true", help="a generated surface at 50, 100 and 200 thousand samples"
+    )
+    parser.add_argument("--part", nargs="+", help=argparse.SUPPRESS)  # one of PARTS, in a process of its own
     args = parser.parse_args()
+    if args.part:
+        PARTS[args.part[0]](*args.part[1:])
+        return 0
     everything = not (args.case or args.decimated or args.growth or args.samples)
     print(f"{'pair':34}{'triangles':>10}" + "".join(f"{stage:>9}" for stage in STAGES) + "    floor  ratio    peak")
     with tempfile.TemporaryDirectory() as folder:
+        small = str(Path(folder) / "small.blend")
+        small_lod = str(Path(folder) / "small_lod.blend")
         for reference, distorted in args.case:
             measure(Path(reference).name, reference, distorted)
         for reference in args.decimated:
-            measure(Path(reference).name + " decimated", reference, decimate(reference, folder))
+            part("decimate", reference, small_lod)
+            measure(f"{Path(reference).name} decimated", reference, small_lod)
         if args.growth or everything:
             for triangles in GENERATED:
-                reference = generate(triangles, folder)
-                measure(f"generated {triangles:,}", reference, decimate(reference, folder))
+                part("generate", str(triangles), small)
+                part("decimate", small, small_lod)
+                measure(f"generated {triangles:,}", small, small_lod)
         if args.samples or everything:
-            reference = generate(GENERATED[0], folder)
-            distorted = decimate(reference, folder)
+            part("generate", str(GENERATED[0]), small)
+            part("decimate", small, small_lod)
             for samples in (50_000, 100_000, 200_000):
-                measure(f"generated, {samples:,} samples", reference, distorted, ["--samples", str(samples)])
+                measure(f"generated, {samples:,} samples", small, small_lod, samples)
     return 0
 
 
-def measure(name: str, reference: str, distorted: str, flags: Sequence[str] = ()) -> None:
+def part(name: str, *args: str) -> str:
+    """Runs one of PARTS in a process of its own, so that this one stays small: a child's peak counts its parent's."""
+    command = [sys.executable, str(Path(__file__).resolve()), "--part", name, *args]
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()[-1]
+
+
+def measure(name: str, reference: str, distorted: str, samples: int = 200_000) -> None:
     """Scores a pair in a process of its own and prints a row: seconds by stage, floor, ratio, peak memory."""
-    command = [
-        sys.executable,
-        str(ROOT / "scripts" / "score.py"),
-        reference,
-        distorted,
-        "--quiet",
-        "--json",
-        "-",
-        *flags,
-    ]
+    flags = ["--quiet", "--samples", str(samples), "--json", "-"]
+    command = [sys.executable, str(ROOT / "scripts" / "score.py"), reference, distorted, *flags]
     with tempfile.TemporaryFile() as out:
         process = subprocess.Popen(command, stdout=out, stderr=subprocess.DEVNULL)
         _, status, usage = os.wait4(process.pid, 0)
@@ -86,15 +94,16 @@ def measure(name: str, reference: str, distorted: str, flags: Sequence[str] = ()
     if pair["error"]:
         print(f"{name:34}{pair['error']}")
         return
-    floor, triangles = query_floor(reference, distorted, flags)
+    floor, triangles = map(float, part("floor", reference, distorted, str(samples)).split())
     seconds = pair["seconds"]
     numbers = "".join(f"{seconds[stage]:9.2f}" for stage in STAGES)
     peak = usage.ru_maxrss / 2**20  # kilobytes on Linux
-    print(f"{name:34}{triangles:10}{numbers}{floor:9.2f}{seconds['total'] / floor:7.2f}{peak:6.2f} GB", flush=True)
+    ratio = seconds["total"] / floor
+    print(f"{name:34}{triangles:10.0f}{numbers}{floor:9.2f}{ratio:7.2f}{peak:6.2f} GB", flush=True)
 
 
-def query_floor(reference: str, distorted: str, flags: Sequence[str]) -> tuple[float, int]:
-    """Seconds of the plain loops on both surfaces, and the reference's triangles."""
+def query_floor(reference: str, distorted: str, samples: str) -> None:
+    """Prints the seconds of the plain loops on both surfaces, and the reference's triangles."""
     from fmqm_addon.blender.bvh import BVHQuery
     from fmqm_addon.blender.files import load_mesh
     from fmqm_addon.metric.score import Evaluation
@@ -102,16 +111,15 @@ def query_floor(reference: str, distorted: str, flags: Sequence[str]) -> tuple[f
     from fmqm_addon.metric.spatial import morton_order
     from fmqm_addon.metric.surface import prepare_surface
 
-    samples = int(flags[1]) if flags else Settings().samples
     ref = prepare_surface(load_mesh(reference), BVHQuery)
     dist = prepare_surface(load_mesh(distorted), BVHQuery, ref.frame)
-    evaluation = Evaluation(ref, Settings(samples=samples))
+    evaluation = Evaluation(ref, Settings(samples=int(samples)))
     evaluation.prepare().run()
     result = evaluation.compare(dist).run()
     order = morton_order(result.samples.positions)
     points = result.samples.positions[order]
     seconds = plain_loops(ref, points, result.ref, order) + plain_loops(dist, points, result.dist, order)
-    return seconds, len(ref.triangles)
+    print(seconds, len(ref.triangles))
 
 
 def plain_loops(surface: Surface, points: np.ndarray, fields: Fields, order: np.ndarray) -> float:
@@ -134,12 +142,12 @@ def plain_loops(surface: Surface, points: np.ndarray, fields: Fields, order: np.
     return time.perf_counter() - began
 
 
-def generate(triangles: int, folder: str) -> str:
+def generate(wanted: str, path: str) -> None:
     """A bumpy torus with a generated texture, as .blend: about so many triangles."""
     import bpy
 
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    around = round((triangles / 4) ** 0.5 * 2)
+    around = round((int(wanted) / 4) ** 0.5 * 2)
     rows = around // 2
     u, v = np.meshgrid(np.arange(around) / around, np.arange(rows) / rows, indexing="ij")
     a, b = 2 * np.pi * u, 2 * np.pi * v
@@ -173,12 +181,10 @@ def generate(triangles: int, folder: str) -> str:
     shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
     material.node_tree.links.new(node.outputs["Color"], shader.inputs["Base Color"])
     mesh.materials.append(material)
-    path = Path(folder) / f"torus_{triangles}.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    return str(path)
+    bpy.ops.wm.save_as_mainfile(filepath=path)
 
 
-def decimate(reference: str, folder: str) -> str:
+def decimate(reference: str, path: str) -> None:
     """A decimated copy of each mesh, as .blend."""
     import bpy
 
@@ -192,9 +198,10 @@ def decimate(reference: str, folder: str) -> str:
     for object_ in meshes:  # keep the outcome, not the modifier: its own time is not what is measured
         object_.data = bpy.data.meshes.new_from_object(object_.evaluated_get(depsgraph), depsgraph=depsgraph)
         object_.modifiers.clear()
-    path = Path(folder) / f"{Path(reference).stem}_decimated.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    return str(path)
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+
+
+PARTS: dict[str, Callable[..., None]] = {"floor": query_floor, "generate": generate, "decimate": decimate}
 
 
 if __name__ == "__main__":

@@ -13,31 +13,37 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn, TextIO, TypeVar
+from typing import TYPE_CHECKING, Any, NoReturn, TextIO, TypeVar
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from fmqm_addon.blender.process import require_bpy, take_stdout
+from fmqm_addon.blender.space import SPACES
 from fmqm_addon.metric.errors import FMQMError, SettingsError
 from fmqm_addon.metric.settings import CENTERS, COLOR_SPACES, POOLINGS, PRESETS, SETTING_NAMES, Settings
 
 if TYPE_CHECKING:
     from fmqm_addon.blender.measure import Comparison, Measurement
+    from fmqm_addon.blender.space import Placed
     from fmqm_addon.metric.score import Stepper
-    from fmqm_addon.metric.surface import MeshArrays
 
 OK, FAILED, WRONG_ARGUMENTS, INTERRUPTED = 0, 1, 2, 130
 T = TypeVar("T")
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """Says what is wrong in one line, without the whole usage before it."""
+    """Says what is wrong in one line, without the whole usage before it; prints its help to the script's own stdout."""
+
+    out: TextIO | None = None
+
+    def print_help(self, file: Any = None) -> None:
+        super().print_help(file or self.out)
 
     def error(self, message: str) -> NoReturn:
         self.exit(WRONG_ARGUMENTS, f"{self.prog}: error: {message} (--help lists all arguments)\n")
 
 
-def build_parser() -> argparse.ArgumentParser:
+def build_parser() -> OneLineParser:
     parser = OneLineParser(
         prog="score.py",
         description="FMQM: how much textured meshes look like their reference; 1 is the same.",
@@ -78,6 +84,14 @@ def build_parser() -> argparse.ArgumentParser:
     settings.add_argument(
         "--repeats", type=int, default=1, metavar="R", help="seeds seed .. seed+R-1; columns become means, with stderr"
     )
+    settings.add_argument(
+        "--space", choices=SPACES, default="auto",
+        help="where the two are compared: as they stand in their worlds, in their local spaces, or (default: auto) "
+        "in the world unless another place fits far better",
+    )  # fmt: skip
+    settings.add_argument(
+        "--match-scale", action="store_true", help="undo a difference in size by a factor between units (100, 2.54)"
+    )
 
     output = parser.add_argument_group("output")
     output.add_argument(
@@ -94,6 +108,7 @@ def build_parser() -> argparse.ArgumentParser:
 def main(argv: Sequence[str], out: TextIO) -> int:
     """Scores as the arguments say, and prints to out; returns the exit code."""
     parser = build_parser()
+    parser.out = out
     args = parser.parse_args(argv)
     try:
         chosen = PRESETS[args.preset] | {
@@ -148,7 +163,7 @@ def _score(args: argparse.Namespace, settings: Settings, out: TextIO) -> int:
     run.score()
     json_document = json_text(
         run.pairs,
-        settings.as_dict() | {"repeats": args.repeats},
+        settings.as_dict() | {"repeats": args.repeats, "space": args.space, "match_scale": args.match_scale},
         {"fmqm_version": VERSION, "blender_version": bpy.app.version_string},
     )
     if args.json == "-":
@@ -189,6 +204,7 @@ class Run:
 
     def score(self) -> None:
         from fmqm_addon.blender.measure import Measurement
+        from fmqm_addon.blender.space import place
         from fmqm_addon.report.pair import PairScore
 
         args = self.args
@@ -197,8 +213,8 @@ class Run:
         error: FMQMError | None = None
         try:
             self._progress.show(0, f"loading {args.reference}")
-            mesh = _timed(seconds, lambda: self._load(args.reference, args.ref_texture))
-            self.measurement = Measurement(mesh, self.settings, args.repeats)
+            reference = _timed(seconds, lambda: self._load(args.reference, args.ref_texture))
+            self.measurement = Measurement(reference.world(), self.settings, args.repeats)
             self._work(self.measurement.prepare(), 0, "preparing the reference", seconds)
         except FMQMError as reason:
             error = reason
@@ -210,8 +226,9 @@ class Run:
                     raise error
                 self._progress.show(index + 1, f"loading {name}")
                 texture = textures[index] if textures else None
-                mesh = _timed(seconds, lambda name=name, texture=texture: self._load(name, texture))  # type: ignore[misc]
-                compared = self._work(self.measurement.compare(mesh), index + 1, f"scoring {name}", seconds)
+                loaded = _timed(seconds, lambda name=name, texture=texture: self._load(name, texture))  # type: ignore[misc]
+                placement = place(reference, loaded, args.space, args.match_scale)
+                compared = self._work(self.measurement.compare(placement.mesh), index + 1, f"scoring {name}", seconds)
                 result = compared.result
                 self.last = compared
                 pair = replace(
@@ -220,7 +237,8 @@ class Run:
                     stderr=compared.stderr,
                     patches=len(result.patches),
                     samples=len(result.samples.positions),
-                    warnings=result.warnings,
+                    space=placement.label,
+                    warnings=(*placement.notes, *placement.warnings, *result.warnings),
                 )
             except FMQMError as reason:
                 pair = replace(pair, error=str(reason))
@@ -232,11 +250,11 @@ class Run:
         for warning in dict.fromkeys(warning for pair in self.pairs for warning in pair.warnings):
             print(f"score.py: warning: {warning}", file=sys.stderr)
 
-    def _load(self, spec: str, image: str | None) -> MeshArrays:
-        from fmqm_addon.blender.files import load_mesh
+    def _load(self, spec: str, image: str | None) -> Placed:
+        from fmqm_addon.blender.files import load_placed
         from fmqm_addon.blender.material import load_texture
 
-        return load_mesh(spec, load_texture(image) if image else None)
+        return load_placed(spec, load_texture(image) if image else None)
 
     def _work(self, stepper: Stepper[T], index: int, text: str, seconds: dict[str, float]) -> T:
         """Runs a stepper to its end with its progress shown and its seconds added up by stage."""
@@ -247,7 +265,7 @@ class Run:
         return stepper.result
 
 
-def _timed(seconds: dict[str, float], load: Callable[[], MeshArrays]) -> MeshArrays:
+def _timed(seconds: dict[str, float], load: Callable[[], Placed]) -> Placed:
     began = time.perf_counter()
     try:
         return load()

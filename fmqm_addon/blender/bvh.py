@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 from mathutils.bvhtree import BVHTree
 
+from ..metric.errors import MeshError
 from ..metric.spatial import Floats, Ints
 
 
@@ -22,12 +23,20 @@ class BVHQuery:
         self._tree = _build_tree(vertices, triangles)
 
     def nearest(self, points: Floats, bounds: Floats | None) -> Ints:
+        """As SurfaceQuery.nearest.
+
+        Raises:
+            MeshError: in float32 all triangles shrink to points: their mesh is too small and too far away.
+        """
         find = self._tree.find_nearest
         if bounds is None:
-            return np.array([find(point)[2] for point in _tuples(points)], np.int64)
-        found = [find(point, bound)[2] for point, bound in zip(_tuples(points), bounds.tolist(), strict=True)]
-        if None in found:  # a bound that rounding made too small
-            found = [find(p)[2] if index is None else index for index, p in zip(found, _tuples(points), strict=True)]
+            found = [find(point)[2] for point in _tuples(points)]
+        else:
+            found = [find(point, bound)[2] for point, bound in zip(_tuples(points), bounds.tolist(), strict=True)]
+            if None in found:  # a bound that rounding made too small
+                found = [find(p)[2] if i is None else i for i, p in zip(found, _tuples(points), strict=True)]
+        if None in found:
+            raise MeshError("the mesh is too small and too far from the reference to be measured against it")
         return np.array(found, np.int64)
 
     def first_hit(self, origins: Floats, directions: Floats) -> tuple[Ints, Floats]:

@@ -13,13 +13,20 @@ import bpy
 from ..metric.color import Texture
 from ..metric.errors import FileError, FMQMError, MeshError
 from ..metric.surface import MeshArrays
-from .mesh import mesh_arrays
+from .snapshot import placed
+from .space import Placed
+from .truncated import check_alembic, check_ply
 
 _OBJECT_IN_BLEND = re.compile(r"(.*?\.blend):(.+)", re.IGNORECASE | re.DOTALL)
 
 
 def load_mesh(spec: str, texture: Texture | None = None) -> MeshArrays:
-    """The asset in a file as one mesh in its world frame; nothing stays in the session.
+    """The asset in a file as one mesh in its world frame; as load_placed."""
+    return load_placed(spec, texture).world()
+
+
+def load_placed(spec: str, texture: Texture | None = None) -> Placed:
+    """The asset in a file as one mesh, with its place; nothing stays in the session.
 
     Args:
         spec: a path, or "file.blend:Object name" for one object, hidden or not. Of a whole file the
@@ -37,7 +44,7 @@ def load_mesh(spec: str, texture: Texture | None = None) -> MeshArrays:
         try:
             if not objects:
                 raise MeshError("no mesh in it; a surface is wanted")
-            return mesh_arrays(objects, object_name or Path(path).name, texture)
+            return placed(objects, object_name or Path(path).name, texture)
         except FMQMError as error:
             raise type(error)(f"{spec}: {error}") from error
     finally:
@@ -57,8 +64,8 @@ def open_file(path: str) -> None:
         raise FileError(f"{path}: no such file")
     if not os.access(path, os.R_OK):
         raise FileError(f"{path}: permission denied; the file cannot be read")
-    if suffix == ".abc":
-        _check_alembic(path)
+    if suffix in _CHECKS:
+        _CHECKS[suffix](path)
     _clear_session()
     try:
         _open(os.path.abspath(path), suffix)
@@ -93,24 +100,6 @@ def _open(path: str, suffix: str) -> None:
         raise FileError(f"{path}: the importer refused it ({', '.join(result).lower()})")
 
 
-def _check_alembic(path: str) -> None:
-    """Refuses a truncated archive, on which Blender's reader aborts the whole process.
-
-    Ogawa: magic and version, 8 bytes; position of the root group, which is written last; that group is
-    the number of its children, then their positions. All whole numbers are 64 bits, little-endian.
-    """
-    size = os.path.getsize(path)
-    with open(path, "rb") as file:
-        header = file.read(16)
-        if not header.startswith(b"Ogawa"):
-            return  # the importer says what it is not
-        root = int.from_bytes(header[8:], "little")
-        file.seek(min(root, size))
-        children = int.from_bytes(file.read(8), "little")
-    if len(header) < 16 or root + 8 + 8 * children > size:
-        raise FileError(f"{path}: the Alembic archive is truncated")
-
-
 _IMPORTERS: dict[str, Callable[[], bpy.types.Operator]] = {
     ".obj": lambda: bpy.ops.wm.obj_import,
     ".ply": lambda: bpy.ops.wm.ply_import,
@@ -125,6 +114,7 @@ _IMPORTERS: dict[str, Callable[[], bpy.types.Operator]] = {
     ".abc": lambda: bpy.ops.wm.alembic_import,
 }
 SUFFIXES = (*_IMPORTERS, ".blend")
+_CHECKS = {".abc": check_alembic, ".ply": check_ply}
 
 
 def _named(name: str, path: str) -> bpy.types.Object:

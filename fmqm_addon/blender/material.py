@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from typing import Any
 
 import bpy
 import numpy as np
@@ -107,14 +108,17 @@ def read_pixels(image: bpy.types.Image) -> NDArray[np.uint8] | NDArray[np.float3
         path = bpy.path.abspath(image.filepath, library=image.library) or image.name
         state = "is broken or of a kind that Blender cannot read" if os.path.exists(path) else "is missing"
         raise MeshError(f"{path}: the base-color image {state}; repair it or give another (--texture, --ref-texture)")
-    values = np.empty(width * height * image.channels, np.float32)
+    values: NDArray[Any] = np.empty(width * height * image.channels, np.float32)
     image.pixels.foreach_get(values)
+    if not image.is_float:  # the values are the file's bytes / 255; keep those, at a quarter of the size
+        values *= 255
+        values += 0.5
+        values = values.astype(np.uint8)
     values = values.reshape(height, width, image.channels)[::-1]
     rgb = values[:, :, :3] if image.channels >= 3 else np.repeat(values[:, :, :1], 3, axis=2)
     if image.is_float:
-        encoded: NDArray[np.float32] = encode_srgb(np.nan_to_num(rgb)).astype(np.float32)
-        return encoded
-    return (rgb * 255 + 0.5).astype(np.uint8)
+        rgb = encode_srgb(np.nan_to_num(rgb)).astype(np.float32)
+    return np.ascontiguousarray(rgb)
 
 
 def load_texture(path: str) -> Texture:

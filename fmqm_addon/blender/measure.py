@@ -68,7 +68,10 @@ class Measurement:
         results = []
         for repeat, evaluation in enumerate(self._evaluations):
             stepper = evaluation.compare(surface)
-            yield from _scaled(stepper, 0.05 + 0.95 * repeat / self._repeats, 0.95 / self._repeats)
+            try:
+                yield from _scaled(stepper, 0.05 + 0.95 * repeat / self._repeats, 0.95 / self._repeats)
+            except MeshError as error:
+                raise MeshError(f"{distorted.name}: {error}") from error
             results.append(stepper.result)
         scores = np.array([result.scores for result in results])
         if not np.isfinite(scores).all():

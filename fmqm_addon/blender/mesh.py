@@ -19,12 +19,15 @@ from ..metric.surface import MeshArrays
 from .material import SlotColor, TextureCache, slot_color
 
 
-def mesh_arrays(objects: Sequence[bpy.types.Object], name: str, texture: Texture | None = None) -> MeshArrays:
+def mesh_arrays(
+    objects: Sequence[bpy.types.Object], name: str, texture: Texture | None = None, frame: Floats | None = None
+) -> MeshArrays:
     """The objects as one mesh: modifiers applied, triangulated, in the world frame.
 
     Args:
         name: what messages call the whole.
         texture: replaces what the materials say.
+        frame: (4, 4) to the world from the frame that positions are wanted in; None is the world's own.
 
     Raises:
         MeshError: none of the objects has a face, or a color cannot be read.
@@ -33,7 +36,7 @@ def mesh_arrays(objects: Sequence[bpy.types.Object], name: str, texture: Texture
     parts = []
     with evaluated(objects) as pairs:
         for original, (object_, depsgraph) in zip(objects, pairs, strict=True):
-            part = _object_arrays(object_, depsgraph, original.name, texture, cache)
+            part = _object_arrays(object_, depsgraph, original.name, texture, cache, frame)
             if part is not None:
                 parts.append(part)
     if not parts:
@@ -96,7 +99,12 @@ class _Part:
 
 
 def _object_arrays(
-    object_: bpy.types.Object, depsgraph: bpy.types.Depsgraph, name: str, texture: Texture | None, cache: TextureCache
+    object_: bpy.types.Object,
+    depsgraph: bpy.types.Depsgraph,
+    name: str,
+    texture: Texture | None,
+    cache: TextureCache,
+    frame: Floats | None,
 ) -> _Part | None:
     """Arrays of one evaluated object; None if it has no faces. The name is the original's, for messages."""
     mesh = object_.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph)
@@ -104,7 +112,7 @@ def _object_arrays(
         if mesh is None or not len(mesh.polygons):
             return None
         local = _read(mesh.vertices, "co", (len(mesh.vertices), 3), np.float32)
-        matrix = np.array(object_.matrix_world, np.float64)
+        matrix = _relative(np.array(object_.matrix_world, np.float64), frame, name)
         faces = mesh.loop_triangles
         triangles = _read(faces, "vertices", (len(faces), 3), np.int32)
         loops = _read(faces, "loops", (len(faces), 3), np.int32)
@@ -131,6 +139,18 @@ def _object_arrays(
         )
     finally:
         object_.to_mesh_clear()
+
+
+def _relative(matrix: Floats, frame: Floats | None, name: str) -> Floats:
+    """(4, 4) from the object to the frame; exactly the identity where the frame is the object's own."""
+    if frame is None:
+        return matrix
+    if np.array_equal(matrix, frame):
+        return np.eye(4)
+    try:
+        return np.asarray(np.linalg.inv(frame) @ matrix)
+    except np.linalg.LinAlgError as error:
+        raise MeshError(f"{name}: its parent has a scale of zero; mend that transform") from error
 
 
 def _slot_material(object_: bpy.types.Object, index: int) -> bpy.types.Material | None:

@@ -29,6 +29,7 @@ class PairScore:
         scores, stderr: (5,) in the order of metric.score.COLUMNS; None where there are none.
         seconds: by STAGES; what several pairs share is counted in the first.
         error: why there are no scores.
+        space: where the two were compared, as blender.space.Placement.label has it.
     """
 
     reference: str
@@ -40,6 +41,7 @@ class PairScore:
     seconds: dict[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     error: str | None = None
+    space: str | None = None
 
     @property
     def fmqm(self) -> float | None:
@@ -90,6 +92,7 @@ def _pair_dict(pair: PairScore) -> dict[str, Any]:
         "stderr": None if pair.stderr is None else _columns(pair.stderr),
         "patches": pair.patches,
         "samples": pair.samples,
+        "space": pair.space,
         "seconds": {stage: pair.seconds.get(stage, 0.0) for stage in STAGES},
         "warnings": list(pair.warnings),
         "error": pair.error,

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..metric.color import srgb_to_lab
 from ..metric.errors import FMQMError
 from ..metric.score import COLUMNS, Result
 from ..metric.spatial import Floats, Ints, closest_on_triangles, dot
 from ..metric.surface import Surface, triangle_normals
+from .colormap import NO_PATCH, score_colors
 from .files import replaced
 
 if TYPE_CHECKING:
@@ -29,10 +29,6 @@ Pixels = NDArray[np.uint8]
 
 BACKGROUND = (236, 237, 239)  # light grey: stands on white pages and on dark ones
 INK, FAINT_INK, RULE = (32, 34, 38), (84, 88, 96), (150, 153, 158)
-NO_PATCH = (0.62, 0.63, 0.65)  # encoded color of a face that no scored patch covers
-
-# Encoded colors from score 0 to score 1: bad is hot and bright, good is dark (inferno without its ends).
-SCORE_COLORS = ("#f9dd4c", "#fbb418", "#f8850f", "#e65d2f", "#cb4149", "#a62c60", "#7f1e6c", "#56106e", "#280b54")
 
 # The camera looks from the front right, a little from above; Blender's front is -Y, and Z is up.
 AZIMUTH, ELEVATION = 32.0, 16.0  # degrees
@@ -224,27 +220,6 @@ def score_by_face(result: Result, surface: Surface, column: str = "FMQM") -> Flo
     scores: Floats = np.full(count, np.nan)
     np.divide(weighted, covered_area, out=scores, where=covered_area > 0)
     return scores
-
-
-def score_colors(scores: Floats) -> Floats:
-    """(N, 3) encoded colors in [0, 1] of scores from 0 (hot) to 1 (dark); NO_PATCH for nan."""
-    table = _score_table()
-    known = np.clip(np.nan_to_num(scores), 0, 1)
-    colors: Floats = table[np.rint(known * (len(table) - 1)).astype(np.int64)]
-    colors[np.isnan(scores)] = NO_PATCH
-    return colors
-
-
-def _score_table(steps: int = 256) -> Floats:
-    """(steps, 3) the colors between SCORE_COLORS at equal distances in CIE L*a*b*, so that equal
-    differences of score look equal."""
-    anchors = np.array([[int(text[k : k + 2], 16) / 255 for k in (1, 3, 5)] for text in SCORE_COLORS])
-    place = np.linspace(0, len(anchors) - 1, 8 * steps)
-    path = np.stack([np.interp(place, np.arange(len(anchors)), channel) for channel in anchors.T], axis=1)
-    walked = np.linalg.norm(np.diff(srgb_to_lab(path), axis=0), axis=1).cumsum()
-    walked = np.concatenate([[0], walked])
-    even = np.linspace(0, walked[-1], steps)
-    return np.stack([np.interp(even, walked, channel) for channel in path.T], axis=1)
 
 
 def write_picture(path: str, reference: Surface, distorted: Surface, result: Result, width: int = WIDTH) -> None:

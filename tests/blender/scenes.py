@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import struct
-import zlib
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
@@ -13,6 +12,10 @@ import numpy as np
 from mathutils import Matrix
 
 from fmqm_addon.metric.surface import MeshArrays
+
+from .script import noise, write_png
+
+__all__ = ["noise", "write_png"]  # for the tests, beside what is defined here
 
 # Unlike in every axis, so that a swap or a mirror shows.
 PLACED = Matrix.LocRotScale((1.0, 2.0, 3.0), Matrix.Rotation(0.7, 3, (0.3, 0.2, 0.5)), (1.0, 2.0, 0.5))
@@ -100,25 +103,6 @@ def textured(path: Path, name: str = "Textured") -> bpy.types.Material:
     return made
 
 
-def noise(size: int = 16, seed: int = 0) -> np.ndarray:
-    """(size, size, 3) uint8, row 0 at the top."""
-    return np.random.default_rng(seed).integers(0, 256, (size, size, 3), np.uint8)
-
-
-def write_png(path: Path, pixels: np.ndarray) -> Path:
-    """(H, W, 3) uint8 or uint16, row 0 at the top: a PNG of 8 or 16 bits, from first principles."""
-    height, width, _ = pixels.shape
-    depth = 8 * pixels.itemsize
-    rows = pixels.astype(pixels.dtype.newbyteorder(">")).tobytes()
-    stride = len(rows) // height
-    filtered = b"".join(b"\0" + rows[first : first + stride] for first in range(0, len(rows), stride))
-    header = struct.pack(">IIBBBBB", width, height, depth, 2, 0, 0, 0)
-    chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(filtered)), (b"IEND", b""))
-    packed = (struct.pack(">I", len(d)) + k + d + struct.pack(">I", zlib.crc32(k + d)) for k, d in chunks)
-    path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(packed))
-    return path
-
-
 def write_exr(path: Path, pixels: np.ndarray) -> Path:
     """(H, W, 3) float32, row 0 at the top: an uncompressed OpenEXR. (Blender 4.5's own save encodes them.)"""
     height, width, _ = pixels.shape
@@ -127,7 +111,8 @@ def write_exr(path: Path, pixels: np.ndarray) -> Path:
     attributes = (
         (b"channels", b"chlist", channels), (b"compression", b"compression", b"\0"),
         (b"dataWindow", b"box2i", window), (b"displayWindow", b"box2i", window), (b"lineOrder", b"lineOrder", b"\0"),
-        (b"pixelAspectRatio", b"float", struct.pack("<f", 1)), (b"screenWindowCenter", b"v2f", struct.pack("<2f", 0, 0)),
+        (b"pixelAspectRatio", b"float", struct.pack("<f", 1)),
+        (b"screenWindowCenter", b"v2f", struct.pack("<2f", 0, 0)),
         (b"screenWindowWidth", b"float", struct.pack("<f", 1)),
     )  # fmt: skip
     header = struct.pack("<2i", 20000630, 2)
@@ -135,8 +120,8 @@ def write_exr(path: Path, pixels: np.ndarray) -> Path:
     rows = [row[:, ::-1].T.astype("<f4").tobytes() for row in pixels]  # B, G, R, each the whole row
     first = len(header) + 8 * height
     offsets = b"".join(struct.pack("<Q", first + y * (8 + len(rows[0]))) for y in range(height))
-    blocks = b"".join(struct.pack("<2i", y, len(row)) + row for y, row in enumerate(rows))
-    path.write_bytes(header + offsets + blocks)
+    scanlines = b"".join(struct.pack("<2i", y, len(row)) + row for y, row in enumerate(rows))
+    path.write_bytes(header + offsets + scanlines)
     return path
 
 

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Measuring from Python, in double precision, without touching the panel's results.
+
+from bl_ext.user_default.fmqm.fmqm_addon import api   # installed; or: from fmqm_addon import api
+
+for outcome in api.measure(bpy.data.objects["Rock_LOD0"], [bpy.data.objects["Rock_LOD1"]]):
+    print(outcome.target.name, outcome.error or outcome.scores[api.COLUMNS.index("FMQM")])
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import bpy
+
+from .blender.job import Outcome, measuring
+from .blender.snapshot import target_of
+from .metric.score import COLUMNS, Result
+from .metric.settings import PRESETS, Settings
+
+__all__ = ["COLUMNS", "PRESETS", "Outcome", "Result", "Settings", "measure"]
+
+Asset: TypeAlias = bpy.types.Object | bpy.types.Collection
+
+
+def measure(
+    reference: Asset,
+    distorted: Asset | Sequence[Asset],
+    settings: Settings | None = None,
+    space: str = "auto",
+    match_scale: bool = False,
+    repeats: int = 1,
+    reference_without_modifiers: bool = False,
+) -> list[Outcome]:
+    """Scores of objects or collections against a reference.
+
+    Args:
+        reference, distorted: mesh objects, empties with meshes below them, collections; hidden or not.
+        settings: the paper's if None; `Settings(**PRESETS["fast"])` for a quick look.
+        space: "auto", "world" or "local". match_scale: undo a factor between units.
+        repeats: measure with so many seeds; scores become means.
+        reference_without_modifiers: the reference is its mesh without modifiers, so that an object can be
+            measured against itself.
+
+    Returns:
+        One outcome per distorted asset, in their order; `outcome.scores` is (5,) float64 in the order of
+        COLUMNS, or None with the reason in `outcome.error`. `outcome.comparison.result` is a metric.score.Result
+        with patches, samples and fields.
+    """
+    assets = [distorted] if isinstance(distorted, (bpy.types.Object, bpy.types.Collection)) else list(distorted)
+    stepper = measuring(
+        target_of(reference, bare=reference_without_modifiers),
+        [target_of(asset) for asset in assets],
+        settings or Settings(),
+        repeats,
+        space,
+        match_scale,
+    )
+    return stepper.run()

@@ -1,0 +1,240 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the add-on shows in the scene, made from arrays: points and surfaces with a color at every place.
+
+Points are small tetrahedra in one mesh: Solid shading draws point clouds grey and loose vertices black.
+Everything is tagged, so that a second one replaces the first and clear() finds it whatever its name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+from numpy.typing import NDArray
+
+from ..metric.color import decode_srgb
+from ..metric.spatial import Floats, Ints
+
+TAG = "fmqm"  # custom property of every data-block of ours: what it is for
+COLLECTION = "FMQM"
+COLOR = "FMQM"  # name of the color attribute
+CLOUD, PAINTED, SHELLS, SLICE = "cloud", "painted", "shells", "slice"
+
+# A regular tetrahedron around the origin, of radius 1, its faces outwards.
+_CORNERS = np.array([(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)], np.float32) / np.sqrt(np.float32(3))
+_FACES = np.array([(0, 1, 2), (0, 3, 1), (0, 2, 3), (1, 3, 2)], np.int32)
+
+
+def find_object(kind: str) -> bpy.types.Object | None:
+    """Our object of a kind, in any scene of this file."""
+    return next((o for o in bpy.data.objects if o.library is None and o.get(TAG) == kind), None)
+
+
+def build_cloud(
+    scene: bpy.types.Scene, kind: str, name: str, positions: Floats, normals: Floats, matrix: Floats, size: float
+) -> bpy.types.Object:
+    """The cloud of a kind in the scene; one that is there gets new points.
+
+    Args:
+        positions: (N, 3). normals: (N, 3) unit, which light the points as the surface would be.
+        matrix: (4, 4) from the positions to the world. size: radius of a point, in the positions' units.
+    """
+    mesh = _cloud_mesh(name, positions, normals, size)
+    return _place(scene, kind, name, mesh, matrix)
+
+
+def build_surface(
+    scene: bpy.types.Scene, kind: str, name: str, vertices: Floats, triangles: Ints, matrix: Floats
+) -> bpy.types.Object:
+    """A smooth surface of a kind in the scene, ready for recolor(); one that is there is replaced.
+
+    Args:
+        vertices: (V, 3). triangles: (T, 3). matrix: (4, 4) from the vertices to the world.
+    """
+    mesh = _mesh(name, vertices.astype(np.float32), triangles.astype(np.int32))
+    return _place(scene, kind, name, mesh, matrix)
+
+
+def recolor(object_: bpy.types.Object, colors: Floats) -> None:
+    """Gives each point of a cloud, or each vertex of a surface, another color; nothing is added.
+
+    Args:
+        colors: (N, 3) encoded (sRGB) in [0, 1].
+    """
+    mesh: bpy.types.Mesh = object_.data
+    linear = np.ones((len(colors), 4), np.float32)
+    linear[:, :3] = decode_srgb(colors)
+    repeat, rest = divmod(len(mesh.vertices), len(colors))
+    if rest:
+        raise ValueError(f"{len(colors)} colors do not fit the {len(mesh.vertices)} vertices of {object_.name}")
+    mesh.attributes[COLOR].data.foreach_set("color", np.repeat(linear, repeat, axis=0).ravel())
+    mesh.update()
+
+
+def resize(object_: bpy.types.Object, size: float, shown: NDArray[np.bool_] | None = None) -> None:
+    """Gives the points of a cloud another radius.
+
+    Args:
+        size: in the cloud's own units. shown: (N,) the other points shrink to nothing; None keeps which.
+    """
+    mesh: bpy.types.Mesh = object_.data
+    corners = np.empty((len(mesh.vertices) // 4, 4, 3), np.float32)
+    mesh.vertices.foreach_get("co", corners.reshape(-1))
+    if shown is None:
+        shown = (corners[:, 0] != corners[:, 1]).any(axis=1)
+    centers = corners.mean(axis=1, keepdims=True)
+    corners = centers + np.where(shown, np.float32(size), np.float32(0))[:, None, None] * _CORNERS
+    mesh.vertices.foreach_set("co", corners.ravel())
+    mesh.update()
+
+
+def centers_of(object_: bpy.types.Object) -> NDArray[np.float32]:
+    """(N, 3) where the points of a cloud are, in its own space."""
+    corners = np.empty((len(object_.data.vertices) // 4, 4, 3), np.float32)
+    object_.data.vertices.foreach_get("co", corners.reshape(-1))
+    centers: NDArray[np.float32] = corners.mean(axis=1)
+    return centers
+
+
+def build_slice(scene: bpy.types.Scene, name: str, matrix: Floats, resolution: int) -> bpy.types.Object:
+    """An image empty, a square of side 1 in its own X and Y; one that is there is kept where it is.
+
+    Blender draws image empties in every shading, unlit.
+    """
+    object_ = find_object(SLICE)
+    if object_ is None:
+        object_ = bpy.data.objects.new(name, None)
+        object_[TAG] = SLICE
+        object_.empty_display_type = "IMAGE"
+        object_.empty_display_size = 1.0
+        object_.matrix_world = Matrix(matrix.tolist())
+    image = object_.data
+    if image is None or tuple(image.size) != (resolution, resolution):
+        object_.data = bpy.data.images.new(name, resolution, resolution, alpha=True)
+        object_.data[TAG] = SLICE
+        if image is not None:
+            bpy.data.images.remove(image)
+    _link(scene, object_)
+    return object_
+
+
+def draw_slice(object_: bpy.types.Object, colors: Floats) -> None:
+    """Writes (resolution^2, 3) encoded colors, rows upwards, into the image of a slice."""
+    pixels = np.ones((len(colors), 4), np.float32)
+    pixels[:, :3] = colors
+    object_.data.pixels.foreach_set(pixels.ravel())
+    object_.data.update()
+
+
+def remove(kind: str) -> None:
+    """Removes our objects of a kind with their data, and what nothing of ours needs any longer."""
+    for object_ in [o for o in _ours(bpy.data.objects) if o[TAG] == kind]:
+        data = object_.data
+        bpy.data.objects.remove(object_)
+        if data is not None and not data.users:
+            (bpy.data.images if isinstance(data, bpy.types.Image) else bpy.data.meshes).remove(data)
+    if not any(_ours(bpy.data.objects)):
+        clear()
+
+
+def clear() -> int:
+    """Removes every data-block of ours; how many there were."""
+    count = 0
+    for blocks in _all_blocks():
+        for block in list(_ours(blocks)):
+            blocks.remove(block)
+            count += 1
+    return count
+
+
+def anything() -> bool:
+    """Whether the file has a data-block of ours."""
+    return any(True for blocks in _all_blocks() for _ in _ours(blocks))
+
+
+def _all_blocks() -> tuple[bpy.types.bpy_prop_collection, ...]:
+    data = bpy.data  # owners before what they own
+    return (data.objects, data.meshes, data.materials, data.images, data.node_groups, data.collections)
+
+
+def _ours(blocks: bpy.types.bpy_prop_collection) -> Iterator[bpy.types.ID]:
+    return (block for block in blocks if block.library is None and TAG in block)
+
+
+def _place(scene: bpy.types.Scene, kind: str, name: str, mesh: bpy.types.Mesh, matrix: Floats) -> bpy.types.Object:
+    """The object of a kind, with this mesh; the mesh it had is removed."""
+    mesh[TAG] = kind
+    mesh.materials.append(_material())
+    object_ = find_object(kind)
+    if object_ is None:
+        object_ = bpy.data.objects.new(name, mesh)
+        object_[TAG] = kind
+    else:
+        before = object_.data
+        object_.data = mesh
+        if not before.users:
+            bpy.data.meshes.remove(before)
+        mesh.name = object_.name = name  # the name was the old mesh's until now
+    object_.matrix_world = Matrix(matrix.tolist())
+    _link(scene, object_)
+    return object_
+
+
+def _link(scene: bpy.types.Scene, object_: bpy.types.Object) -> None:
+    collection = next((c for c in _ours(bpy.data.collections)), None)
+    if collection is None:
+        collection = bpy.data.collections.new(COLLECTION)
+        collection[TAG] = "collection"
+    if collection.name not in scene.collection.children:
+        scene.collection.children.link(collection)
+    if object_.name not in collection.objects:
+        collection.objects.link(object_)
+
+
+def _cloud_mesh(name: str, positions: Floats, normals: Floats, size: float) -> bpy.types.Mesh:
+    vertices = positions.astype(np.float32)[:, None, :] + np.float32(size) * _CORNERS
+    first = 4 * np.arange(len(positions), dtype=np.int32)
+    mesh = _mesh(name, vertices.reshape(-1, 3), (first[:, None, None] + _FACES).reshape(-1, 3))
+    normal = mesh.attributes.new("custom_normal", "FLOAT_VECTOR", "POINT")
+    normal.data.foreach_set("vector", np.repeat(normals.astype(np.float32), 4, axis=0).ravel())
+    return mesh
+
+
+def _mesh(name: str, vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> bpy.types.Mesh:
+    """A smooth mesh with a white color attribute; foreach_set is the only quick way."""
+    mesh = bpy.data.meshes.new(name)
+    mesh.vertices.add(len(vertices))
+    mesh.vertices.foreach_set("co", vertices.ravel())
+    mesh.loops.add(triangles.size)
+    mesh.loops.foreach_set("vertex_index", triangles.ravel())
+    mesh.polygons.add(len(triangles))
+    mesh.polygons.foreach_set("loop_start", np.arange(0, triangles.size, 3, dtype=np.int32))
+    mesh.color_attributes.new(COLOR, "FLOAT_COLOR", "POINT")
+    mesh.color_attributes.active_color_index = 0
+    mesh.color_attributes.render_color_index = 0
+    mesh.update(calc_edges=True)
+    return mesh
+
+
+def _material() -> bpy.types.Material:
+    """Glows in the color of the attribute: for Material Preview, EEVEE and Cycles."""
+    found = next(_ours(bpy.data.materials), None)
+    if found is not None:
+        return found
+    material = bpy.data.materials.new("FMQM Color")
+    material[TAG] = "material"
+    if material.node_tree is None:  # 5.0 and later always have one
+        material.use_nodes = True
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    nodes.clear()
+    color = nodes.new("ShaderNodeVertexColor")
+    color.layer_name = COLOR
+    glow = nodes.new("ShaderNodeEmission")
+    output = nodes.new("ShaderNodeOutputMaterial")
+    for x, node in enumerate((color, glow, output)):
+        node.location = (220 * x, 0)
+    links.new(color.outputs["Color"], glow.inputs["Color"])
+    links.new(glow.outputs["Emission"], output.inputs["Surface"])
+    return material

@@ -1,0 +1,273 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the user named in a scene, as arrays and a transform; and whether it has changed since."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..metric.color import Texture
+from ..metric.errors import MeshError
+from ..metric.spatial import Floats
+from ..metric.surface import MeshArrays
+from .mesh import evaluated, mesh_arrays
+from .space import Placed, moved
+
+OBJECT, COLLECTION = "OBJECT", "COLLECTION"
+_MAX_DEPTH = 16  # of collection instances in collection instances
+
+
+@dataclass(frozen=True)
+class Target:
+    """An asset by its name: Blender may delete, undo or reload the thing itself at any time.
+
+    Attributes:
+        kind: OBJECT or COLLECTION. name: with its library, as name_full has it.
+        bare: without modifiers; for mesh objects.
+    """
+
+    kind: str
+    name: str
+    bare: bool = False
+
+    @property
+    def label(self) -> str:
+        return f"{self.name} (no modifiers)" if self.bare else self.name
+
+    def find(self) -> bpy.types.Object | bpy.types.Collection | None:
+        blocks = bpy.data.objects if self.kind == OBJECT else bpy.data.collections
+        return next((block for block in blocks if block.name_full == self.name), None)
+
+
+def target_of(block: bpy.types.Object | bpy.types.Collection, bare: bool = False) -> Target:
+    return Target(OBJECT if isinstance(block, bpy.types.Object) else COLLECTION, block.name_full, bare)
+
+
+def take(target: Target) -> Placed:
+    """The asset's arrays, read from Blender; nothing stays behind.
+
+    A mesh object is itself. An empty is the meshes below it and what it instances, a collection is its
+    meshes; those disabled in renders are left out of either, unless all are.
+
+    Raises:
+        MeshError: it is gone, of another type, or holds nothing that can be measured.
+    """
+    block = target.find()
+    if block is None:
+        raise MeshError(f"{target.name}: it is no longer in the file; choose another")
+    if isinstance(block, bpy.types.Collection):
+        return placed(_members(block.all_objects), target.label)
+    if block.type == "MESH":
+        if not block.users_scene:
+            raise MeshError(f"{target.name}: it has been deleted from the scene; choose another")
+        return _without_modifiers(block, target.label) if target.bare else placed([block], target.label, origin=block)
+    if block.type != "EMPTY":
+        raise MeshError(f"{target.name}: the object is of type {block.type.lower()}; a mesh is wanted")
+    return placed(_members([block, *block.children_recursive]), target.label, origin=block)
+
+
+def placed(
+    objects: Sequence[bpy.types.Object],
+    name: str,
+    texture: Texture | None = None,
+    origin: bpy.types.Object | None = None,
+) -> Placed:
+    """Objects as one mesh in the frame of their origin.
+
+    Args:
+        origin: the object whose frame it is; None is the only one, or the one that all hang from, or else the world.
+        texture: replaces what the materials say.
+
+    Raises:
+        MeshError: none of them has a face, or a color cannot be read.
+    """
+    if origin is None and len(objects) == 1:
+        origin = objects[0]
+    elif origin is None:
+        roots = {_root(object_).name_full: _root(object_) for object_ in objects}
+        origin = next(iter(roots.values())) if len(roots) == 1 else None
+    matrix = np.eye(4) if origin is None else _matrix_of(origin)
+    return Placed(_arrays(objects, name, texture, matrix, 0), matrix)
+
+
+def contains_mesh(block: bpy.types.Object | bpy.types.Collection) -> bool:
+    """Whether there is a mesh to measure in an object or collection, faces or not."""
+    if isinstance(block, bpy.types.Collection):
+        return bool(_members(block.all_objects))
+    return block.type == "MESH" or (block.type == "EMPTY" and bool(_members([block, *block.children_recursive])))
+
+
+def _arrays(
+    objects: Sequence[bpy.types.Object], name: str, texture: Texture | None, frame: Floats, depth: int
+) -> MeshArrays:
+    """Meshes, and what the instancing empties among the objects show, in the frame."""
+    meshes = [object_ for object_ in objects if object_.type == "MESH"]
+    instancers = [object_ for object_ in objects if depth < _MAX_DEPTH and _instanced(object_) is not None]
+    parts = [mesh_arrays(meshes, name, texture, frame)] if meshes or not instancers else []
+    for instancer in instancers:
+        collection = instancer.instance_collection
+        offset = np.eye(4)
+        offset[:3, 3] = collection.instance_offset
+        inner = _arrays(_members(collection.all_objects), name, texture, offset, depth + 1)
+        matrix = _matrix_of(instancer)
+        parts.append(moved(inner, np.eye(4) if np.array_equal(matrix, frame) else np.linalg.inv(frame) @ matrix))
+    return parts[0] if len(parts) == 1 else _join(parts, name)
+
+
+def _join(parts: Sequence[MeshArrays], name: str) -> MeshArrays:
+    vertex_start = np.cumsum([0] + [len(part.positions) for part in parts[:-1]])
+    color_start = np.cumsum([0] + [len(part.colors) for part in parts[:-1]])
+    return MeshArrays(
+        name=name,
+        positions=np.concatenate([part.positions for part in parts]),
+        triangles=np.concatenate([part.triangles + start for part, start in zip(parts, vertex_start, strict=True)]),
+        uv=np.concatenate([part.uv for part in parts]),
+        material=np.concatenate([part.material + start for part, start in zip(parts, color_start, strict=True)]),
+        colors=tuple(color for part in parts for color in part.colors),
+        warnings=tuple(dict.fromkeys(warning for part in parts for warning in part.warnings)),
+    )
+
+
+def _without_modifiers(object_: bpy.types.Object, label: str) -> Placed:
+    """By way of a duplicate of the object, on the same mesh."""
+    if object_.mode == "EDIT":
+        object_.update_from_editmode()
+    duplicate = object_.copy()
+    try:
+        duplicate.modifiers.clear()
+        result = placed([duplicate], label, origin=duplicate)
+        warnings = tuple(w.replace(duplicate.name, object_.name, 1) for w in result.mesh.warnings)
+        return replace(result, mesh=replace(result.mesh, warnings=warnings))
+    except MeshError as error:
+        raise MeshError(str(error).replace(duplicate.name, object_.name)) from error
+    finally:
+        bpy.data.objects.remove(duplicate)
+
+
+def _members(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
+    """The meshes and instancing empties, by name: the order must not depend on the scene's."""
+    found = [object_ for object_ in objects if object_.type == "MESH" or _instanced(object_) is not None]
+    visible = [object_ for object_ in found if not object_.hide_render]
+    return sorted(visible or found, key=lambda object_: object_.name_full)
+
+
+def _instanced(object_: bpy.types.Object) -> bpy.types.Collection | None:
+    return object_.instance_collection if object_.instance_type == "COLLECTION" else None
+
+
+def _root(object_: bpy.types.Object) -> bpy.types.Object:
+    while object_.parent is not None:
+        object_ = object_.parent
+    return object_
+
+
+def _matrix_of(object_: bpy.types.Object) -> Floats:
+    """(4, 4) float64, up to date, wherever the object is."""
+    with evaluated([object_]) as [(found, _)]:
+        return np.array(found.matrix_world, np.float64)
+
+
+def fingerprint(target: Target, place_counts: bool) -> str:
+    """A short text that differs when mesh, modifiers, materials, size or, where it counts, the place have changed.
+
+    Original data, not evaluated: cheap, and the same whether the object is hidden. "" if it is gone.
+    """
+    block = target.find()
+    if block is None:
+        return ""
+    if isinstance(block, bpy.types.Collection):
+        objects = _members(block.all_objects)
+    else:
+        if not block.users_scene:
+            return ""
+        objects = [block] if block.type == "MESH" else _members([block, *block.children_recursive])
+    digest = hashlib.blake2b(digest_size=12)
+    for object_ in objects:
+        matrix = np.array(object_.matrix_world, np.float32)
+        digest.update((matrix if place_counts else matrix[:3, :3]).tobytes())
+        if object_.type == "MESH":
+            _add_mesh(digest, object_.data)
+            for modifier in () if target.bare else object_.modifiers:
+                _add_values(digest, modifier)
+            for slot in object_.material_slots:
+                _add_material(digest, slot.material)
+    return digest.hexdigest()
+
+
+def _add_mesh(digest: Any, mesh: bpy.types.Mesh) -> None:
+    digest.update(f"{len(mesh.vertices)} {len(mesh.loops)} {len(mesh.polygons)}".encode())
+    for name, key, kind, width in (("position", "vector", np.float32, 3), (".corner_vert", "value", np.int32, 1)):
+        attribute = mesh.attributes.get(name)
+        if attribute is not None and len(attribute.data):
+            _add_array(digest, attribute.data, key, len(attribute.data) * width, kind)
+    layer = next((layer for layer in mesh.uv_layers if layer.active_render), None)
+    if layer is not None and len(layer.uv):
+        _add_array(digest, layer.uv, "vector", len(layer.uv) * 2, np.float32)
+    if len(mesh.polygons):
+        _add_array(digest, mesh.polygons, "material_index", len(mesh.polygons), np.int32)
+    if mesh.shape_keys is not None:
+        digest.update(repr([(key.name, key.value, key.mute) for key in mesh.shape_keys.key_blocks]).encode())
+
+
+def _add_array(digest: Any, collection: Any, key: str, size: int, kind: type) -> None:
+    values: NDArray[Any] = np.empty(size, kind)
+    collection.foreach_get(key, values)
+    digest.update(values)
+
+
+def _add_material(digest: Any, material: bpy.types.Material | None) -> None:
+    if material is None:
+        digest.update(b"none")
+        return
+    digest.update(np.array(material.diffuse_color, np.float32))
+    if material.node_tree is None:
+        return
+    for node in material.node_tree.nodes:
+        _add_values(digest, node)
+        for socket in node.inputs:
+            digest.update(repr(_plain(getattr(socket, "default_value", None))).encode())
+        image = getattr(node, "image", None)
+        if image is not None:
+            digest.update(repr((image.name, image.filepath, tuple(image.size), image.is_dirty)).encode())
+    for link in material.node_tree.links:
+        names = (link.from_node.name, link.from_socket.identifier, link.to_node.name, link.to_socket.identifier)
+        digest.update(repr(names).encode())
+
+
+_NOT_A_VALUE = {"location", "location_absolute", "width", "height", "select", "is_active", "dimensions"}
+_VALUES = {"BOOLEAN", "INT", "FLOAT", "STRING", "ENUM"}
+
+
+def _add_values(digest: Any, block: Any) -> None:
+    """The plain settings of a modifier or node, with what it points at by name."""
+    for prop in block.bl_rna.properties:
+        name = prop.identifier
+        if name in _NOT_A_VALUE or name.startswith(("show_", "execution_time", "bl_")):
+            continue
+        if prop.type in _VALUES and not prop.is_readonly:
+            value = getattr(block, name)
+            digest.update(f"{name}={_plain(value)}".encode())
+        elif prop.type == "POINTER" and isinstance(getattr(block, name), bpy.types.ID):
+            digest.update(f"{name}={getattr(block, name).name_full}".encode())
+    if isinstance(block, bpy.types.Modifier):
+        digest.update(f"{block.show_viewport}".encode())
+        if block.type == "NODES":
+            digest.update(repr([(key, str(block[key])) for key in block.keys()]).encode())  # noqa: SIM118
+
+
+def _plain(value: Any) -> Any:
+    """Something whose repr tells its value: Blender's arrays print their addresses."""
+    if value is None or isinstance(value, (int, float, str, set)):
+        return value
+    if isinstance(value, bpy.types.ID):
+        return value.name_full
+    try:
+        return tuple(value)
+    except TypeError:
+        return str(type(value))

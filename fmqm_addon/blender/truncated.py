@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Truncated files on which Blender's importers would end the whole process."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..metric.errors import FileError
+
+_PLY_BYTES = {
+    **dict.fromkeys(("char", "uchar", "int8", "uint8"), 1),
+    **dict.fromkeys(("short", "ushort", "int16", "uint16"), 2),
+    **dict.fromkeys(("int", "uint", "int32", "uint32", "float", "float32"), 4),
+    **dict.fromkeys(("double", "float64"), 8),
+}
+
+
+def check_alembic(path: str) -> None:
+    """An Ogawa archive must hold its root group, which is written last.
+
+    Magic and version, 8 bytes; position of the root group; that group is the number of its children, then
+    their positions. All whole numbers have 8 bytes, little-endian.
+
+    Raises:
+        FileError: it does not.
+    """
+    with open(path, "rb") as file:
+        size = file.seek(0, 2)
+        file.seek(0)
+        header = file.read(16)
+        if not header.startswith(b"Ogawa"):
+            return  # the importer says what it is not
+        root = int.from_bytes(header[8:], "little")
+        file.seek(min(root, size))
+        children = int.from_bytes(file.read(8), "little")
+    if len(header) < 16 or root + 8 + 8 * children > size:
+        raise FileError(f"{path}: the Alembic archive is truncated")
+
+
+def check_ply(path: str) -> None:
+    """A binary PLY must hold all the elements that its header counts.
+
+    Raises:
+        FileError: it does not.
+    """
+    with open(path, "rb") as file:
+        data = file.read()
+    header, _, _ = data.partition(b"end_header")
+    order = "big" if b"format binary_big_endian" in header else "little"
+    if not data.startswith(b"ply") or b"format binary_" not in header or len(header) == len(data):
+        return  # text, whose end the importer notices, or what it refuses anyway
+    position = data.find(b"\n", len(header)) + 1
+    try:
+        for count, properties in _ply_elements(header.decode("latin-1")):
+            if all(count_bytes == 0 for count_bytes, _ in properties):
+                position += count * sum(value_bytes for _, value_bytes in properties)
+                continue
+            for _ in range(count):
+                for count_bytes, value_bytes in properties:
+                    length = int.from_bytes(data[position : position + count_bytes], order) if count_bytes else 1
+                    position += count_bytes + length * value_bytes
+                if position > len(data):
+                    break
+    except (KeyError, ValueError, IndexError):
+        return  # a header that the importer judges
+    if position > len(data):
+        raise FileError(f"{path}: the PLY file is truncated")
+
+
+def _ply_elements(header: str) -> Iterator[tuple[int, list[tuple[int, int]]]]:
+    """Count and properties of each element: bytes of a list's length, 0 for a single value, and of a value."""
+    count, properties = 0, []
+    for words in (line.split() for line in header.splitlines()):
+        if words[:1] == ["element"]:
+            yield count, properties
+            count, properties = int(words[2]), []
+        elif words[:2] == ["property", "list"]:
+            properties.append((_PLY_BYTES[words[2]], _PLY_BYTES[words[3]]))
+        elif words[:1] == ["property"]:
+            properties.append((0, _PLY_BYTES[words[1]]))
+    yield count, properties

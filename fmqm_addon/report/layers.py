@@ -1,0 +1,241 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What can be shown of a result: a number or a color at every place, its color, and the legend that explains it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..metric.fields import Fields
+from ..metric.score import COLUMNS, Result
+from ..metric.spatial import Floats, dot
+from .colormap import GREY_DARK, GREY_LIGHT, SKY, VERMILION, number_colors, score_colors, signed_colors
+
+# How values become colors.
+SCORE = "score"  # 0 to 1, low is hot
+AMOUNT = "amount"  # 0 up, high is hot
+LENGTH = "length"  # the same in scene units
+SIGNED = "signed"  # scene units, either side of 0
+COLOR = "color"  # itself
+SIDES = "sides"  # inside or outside of either surface
+NUMBER = "number"  # only told apart
+
+FIXED_LENGTH = {LENGTH: 0.01, SIGNED: 0.02}  # upper end of the fixed range, in diagonals of the reference
+FIT_PERCENTILE = 99.0  # a fitted range of samples ends here: a few wild ones would flatten all others
+SIDE_NAMES = ("Outside both", "Inside both", "Inside reference only", "Inside compared only")
+_SIDE_COLORS = np.array([GREY_LIGHT, GREY_DARK, VERMILION, SKY])
+_TICKS = 5
+
+
+@dataclass(frozen=True)
+class Layer:
+    """Something to show.
+
+    Attributes:
+        name: identifier. label: for the menu and the legend. kind: how its values become colors.
+        description: for an artist.
+    """
+
+    name: str
+    label: str
+    kind: str
+    description: str
+
+    @property
+    def per_patch(self) -> bool:
+        return self.kind in (SCORE, NUMBER)
+
+
+LAYERS: dict[str, Layer] = {
+    layer.name: layer
+    for layer in (
+        Layer("FMQM", "FMQM", SCORE, "Quality of each patch: what the score is the mean of"),
+        Layer("geoSSIM", "Shape", SCORE, "geoSSIM: low where the surface moved away or lost relief"),
+        Layer("geoGraSSIM", "Direction", SCORE, "geoGraSSIM: low where the surface faces another way"),
+        Layer("colorSSIM", "Color", SCORE, "colorSSIM: low where colors changed or detail was lost"),
+        Layer("colorGraSSIM", "Color Edges", SCORE, "colorGraSSIM: low where edges in the texture moved or blurred"),
+        Layer("NCF_REFERENCE", "Color of Reference", COLOR, "NCF: the reference's color nearest to each sample"),
+        Layer("NCF_COMPARED", "Color of Compared", COLOR, "NCF: the compared object's color nearest to each sample"),
+        Layer(
+            "NCF_DIFFERENCE",
+            "Color Difference",
+            AMOUNT,
+            "Distance between the two colors in RGB",
+        ),
+        Layer(
+            "SDF_REFERENCE",
+            "Distance to Reference",
+            SIGNED,
+            "SDF: distance to the reference, negative inside",
+        ),
+        Layer(
+            "SDF_COMPARED",
+            "Distance to Compared",
+            SIGNED,
+            "SDF: distance to the compared object, negative inside",
+        ),
+        Layer(
+            "SDF_DIFFERENCE",
+            "Distance Difference",
+            LENGTH,
+            "How much the two differ: where the surface moved",
+        ),
+        Layer("SIDES", "Inside or Outside", SIDES, "On which side of the two surfaces each sample lies"),
+        Layer("PATCH", "Patch Number", NUMBER, "Which samples belong to one patch"),
+    )
+}
+
+
+@dataclass(frozen=True)
+class Legend:
+    """What the colors mean.
+
+    Attributes:
+        title: what is shown. subtitle: of which object.
+        bar: encoded colors from the lower to the upper end, or empty. ticks: place in [0, 1] and text.
+        mark: place in [0, 1] and text of the whole score, or None.
+        swatches: encoded color and text of each kind of thing. note: one line below.
+    """
+
+    title: str
+    subtitle: str
+    bar: tuple[tuple[float, float, float], ...] = ()
+    ticks: tuple[tuple[float, str], ...] = ()
+    mark: tuple[float, str] | None = None
+    swatches: tuple[tuple[tuple[float, float, float], str], ...] = ()
+    note: str = ""
+
+    def as_dict(self) -> dict[str, object]:
+        return asdict(self)
+
+
+def layer_values(result: Result, name: str, length: float | None = None) -> NDArray[np.float64]:
+    """A layer at the N samples.
+
+    Args:
+        name: of LAYERS. length: scene units of the metric's unit; the frame's, if None.
+
+    Returns:
+        (N,) float64: scores in [0, 1], differences, lengths in scene units, or whole numbers; (N, 3)
+        encoded colors for the kind COLOR.
+    """
+    if LAYERS[name].per_patch:
+        return _values_of_patches(result, name)[result.samples.patch]
+    return field_values(name, result.ref, result.dist, result.frame.scale if length is None else length)
+
+
+def field_values(name: str, ref: Fields, dist: Fields, length: float) -> NDArray[np.float64]:
+    """A layer that is not per patch, from the fields of both surfaces at the same places; as in layer_values."""
+    if name in ("NCF_REFERENCE", "NCF_COMPARED"):
+        return (ref if name == "NCF_REFERENCE" else dist).ncf.astype(np.float64)
+    values: Floats
+    if name == "NCF_DIFFERENCE":
+        gap = ref.ncf.astype(np.float64) - dist.ncf
+        values = np.sqrt(dot(gap, gap) / 3)
+        return values
+    if name == "SDF_DIFFERENCE":
+        values = np.abs(ref.sdf - dist.sdf) * length
+        return values
+    if name == "SIDES":
+        inside_r, inside_d = ref.sdf < 0, dist.sdf < 0
+        return np.where(inside_r == inside_d, inside_r * 1.0, np.where(inside_r, 2.0, 3.0))
+    return (ref if name == "SDF_REFERENCE" else dist).sdf * length
+
+
+def _values_of_patches(result: Result, name: str) -> NDArray[np.float64]:
+    """(P,) a layer of the kinds SCORE and NUMBER."""
+    if name == "PATCH":
+        return np.arange(len(result.patches), dtype=np.float64)
+    return result.patch_scores[:, COLUMNS.index(name)]
+
+
+def value_range(name: str, values: Floats, fitted: bool, diagonal: float) -> tuple[float, float]:
+    """The lower and upper end of the color map; (0, 1) where there is none.
+
+    Args:
+        values: (N,) what is shown. fitted: to these values, not fixed.
+        diagonal: of the reference's bounding box, in scene units.
+    """
+    kind = LAYERS[name].kind
+    if kind not in (SCORE, AMOUNT, LENGTH, SIGNED):
+        return 0.0, 1.0
+    if not fitted or not len(values):
+        high = diagonal * FIXED_LENGTH.get(kind, 1.0 / diagonal)
+        return (-high if kind == SIGNED else 0.0), high
+    if kind == SCORE:
+        low, high = float(values.min()), float(values.max())
+        return (low, high) if high > low else (max(low - 0.005, 0.0), max(low, 0.005))
+    high = float(np.percentile(np.abs(values), FIT_PERCENTILE)) or diagonal * 1e-6
+    return (-high if kind == SIGNED else 0.0), high
+
+
+def layer_colors(name: str, values: NDArray[np.float64], low: float, high: float) -> Floats:
+    """(N, 3) encoded colors in [0, 1] of a layer's values between the ends of value_range."""
+    kind = LAYERS[name].kind
+    if kind == COLOR:
+        return values
+    if kind == SIDES:
+        return _SIDE_COLORS[values.astype(np.int64)]
+    if kind == NUMBER:
+        return number_colors(values.astype(np.int64))
+    if kind == SIGNED:
+        return signed_colors(values / high)
+    place = (values - low) / (high - low)
+    return score_colors(place if kind == SCORE else 1 - place)
+
+
+def sample_colors(result: Result, name: str, fitted: bool, length: float) -> tuple[Floats, tuple[float, float]]:
+    """(N, 3) encoded colors of the samples, and the ends of the color map.
+
+    Args:
+        length: scene units of the metric's unit, which is the reference's diagonal.
+    """
+    if LAYERS[name].per_patch:  # few colors, many samples
+        values = _values_of_patches(result, name)
+        ends = value_range(name, values, fitted, length)
+        return layer_colors(name, values, *ends)[result.samples.patch], ends
+    values = field_values(name, result.ref, result.dist, length)
+    ends = value_range(name, values, fitted, length)
+    return layer_colors(name, values, *ends), ends
+
+
+def legend(
+    name: str,
+    ends: tuple[float, float],
+    subtitle: str,
+    result: Result,
+    length_text: Callable[[float], str] = lambda value: f"{value:.3g}",
+) -> Legend:
+    """The legend of a layer that is shown between two ends.
+
+    Args:
+        length_text: a length in scene units as the user wants to read it.
+    """
+    layer = LAYERS[name]
+    if layer.kind == COLOR:
+        return Legend(layer.label, subtitle, note="as in the textures")
+    if layer.kind == NUMBER:
+        return Legend(layer.label, subtitle, note=f"{len(result.patches)} patches")
+    if layer.kind == SIDES:
+        swatches = tuple((tuple(c), text) for c, text in zip(_SIDE_COLORS.tolist(), SIDE_NAMES, strict=True))
+        return Legend(layer.label, subtitle, swatches=swatches)
+    low, high = ends
+    shown = np.linspace(low, high, 33)
+    bar = tuple(tuple(color) for color in layer_colors(name, shown, low, high).tolist())
+    text = length_text if layer.kind in (LENGTH, SIGNED) else _number_text(high - low)
+    ticks = tuple((k / (_TICKS - 1), text(low + (high - low) * k / (_TICKS - 1))) for k in range(_TICKS))
+    if layer.kind != SCORE:
+        return Legend(layer.label, subtitle, bar, ticks)
+    score = float(result.scores[COLUMNS.index(name)])
+    place = min(max((score - low) / (high - low), 0.0), 1.0)
+    heading = layer.label if layer.label == name else f"{layer.label} ({name})"
+    return Legend(heading, subtitle, bar, ticks, (place, f"{score:.4f}"))
+
+
+def _number_text(span: float) -> Callable[[float], str]:
+    """Numbers with as many decimals as tell the ticks of a span apart."""
+    decimals = int(np.clip(np.ceil(-np.log10(max(span, 1e-12) / (_TICKS - 1))) + (span < 0.5), 2, 6))
+    return lambda value: f"{value:.{decimals}f}"

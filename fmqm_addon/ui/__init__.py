@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The sidebar: properties, operators, panels. Thin; what they do is in metric, blender and report."""
+
+from __future__ import annotations
+
+import bpy
+
+from . import look, operators, panels, properties, scene, watch
+
+_look_groups = tuple(cls for cls in look.CLASSES if issubclass(cls, bpy.types.PropertyGroup))
+_look_rest = tuple(cls for cls in look.CLASSES if cls not in _look_groups)
+
+# Groups before the scene's group that holds them, panels before their sub-panels.
+CLASSES: tuple[type, ...] = (
+    *properties.CLASSES,
+    *_look_groups,
+    *scene.CLASSES,
+    *operators.CLASSES,
+    *panels.CLASSES,
+    *_look_rest,
+)
+
+
+def register() -> None:
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+    scene.register()
+    operators.register()
+    watch.register()
+    look.register()
+
+
+def unregister() -> None:
+    """The exact mirror of register."""
+    look.unregister()
+    watch.unregister()
+    operators.unregister()
+    scene.unregister()
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

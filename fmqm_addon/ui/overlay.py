@@ -1,0 +1,282 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is drawn over the 3D viewport: legends, the figure of a sample's units, and a mark at the sample.
+
+Drawing computes nothing: legends are stored on the objects that they explain, a figure is made by its operator.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import blf
+import bpy
+import gpu
+import numpy as np
+from gpu_extras.batch import batch_for_shader
+from numpy.typing import NDArray
+
+from ..blender import pointcloud
+from ..metric.spatial import Floats
+
+LEGEND = "fmqm_legend"  # custom property of the objects that have a legend: report.layers.Legend as JSON
+_FONT = 0
+_MARGIN, _PAD, _LINE, _GAP = 14, 10, 17, 8  # pixels at a UI scale of 1
+_BAR_WIDTH, _BAR_HEIGHT, _TICK = 14, 150, 4
+_PANEL = 128  # side of one of the figure's four pictures
+_DOT = 2.6
+_OPACITY = 0.82
+
+Color = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class UnitPicture:
+    """One of the four pictures of a unit.
+
+    Attributes:
+        colors: (side, side, 4) encoded RGBA, rows upwards; clear outside of the unit.
+        dots: (n, 2) the samples in it, in [-1, 1]. dot_colors: (n, 3) encoded.
+    """
+
+    colors: NDArray[np.float32]
+    dots: Floats
+    dot_colors: Floats
+
+
+@dataclass
+class UnitFigure:
+    """The normal and tangent unit of a sample, of both surfaces, side by side.
+
+    Attributes:
+        title: which sample. pictures: normal reference, normal compared, tangent reference, tangent compared.
+        scene: the name of the scene it belongs to. lines: (m, 2, 3) the mark in the world.
+    """
+
+    title: str
+    pictures: tuple[UnitPicture, UnitPicture, UnitPicture, UnitPicture]
+    scene: str
+    lines: Floats
+    batches: list[Any] = field(default_factory=list)  # made when first drawn: only there is a GPU context
+
+
+figure: UnitFigure | None = None
+on_draw: Callable[[], None] | None = None  # called before each drawing: has the slice been moved?
+_handles: list[Any] = []
+
+
+def register() -> None:
+    if bpy.app.background:
+        return  # nothing will ever be drawn
+    add = bpy.types.SpaceView3D.draw_handler_add
+    _handles.append(add(_draw_marks, (), "WINDOW", "POST_VIEW"))
+    _handles.append(add(_draw_legends, (), "WINDOW", "POST_PIXEL"))
+
+
+def unregister() -> None:
+    global figure
+    figure = None
+    while _handles:
+        bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), "WINDOW")
+
+
+def legends() -> list[dict[str, Any]]:
+    """The legends of our objects that this view shows."""
+    space = bpy.context.space_data
+    shown = []
+    for object_ in _collection_objects():
+        if LEGEND in object_ and object_.visible_get(viewport=space):
+            shown.append(json.loads(object_[LEGEND]))
+    return shown
+
+
+def _collection_objects() -> list[bpy.types.Object]:
+    found = next((c for c in bpy.data.collections if c.library is None and pointcloud.TAG in c), None)
+    return [] if found is None else list(found.objects)
+
+
+def _draw_legends() -> None:
+    """The legends from the lower left, and the figure to their right."""
+    if on_draw is not None:
+        on_draw()
+    if not bpy.context.space_data.overlay.show_overlays:
+        return
+    ink = _Ink()
+    x, y = _corner(ink)
+    for legend in legends():
+        x += _draw_legend(ink, legend, x, y) + ink.px(_GAP)
+    if figure is not None and figure.scene == bpy.context.scene.name:
+        _draw_figure(ink, figure, x, y)
+
+
+class _Ink:
+    """Type, colors and lengths of this user's interface."""
+
+    def __init__(self) -> None:
+        preferences = bpy.context.preferences
+        self._scale = preferences.system.ui_scale
+        widget = preferences.themes[0].user_interface.wcol_tooltip
+        self.back: Color = (*widget.inner[:3], _OPACITY)
+        self.text: Color = (*widget.text[:3], 1.0)
+        self.faint: Color = (*widget.text[:3], 0.7)
+        self.points = preferences.ui_styles[0].widget.points * self._scale
+
+    def px(self, length: float) -> float:
+        return round(length * self._scale)
+
+    def width(self, text: str) -> float:
+        blf.size(_FONT, self.points)
+        return float(blf.dimensions(_FONT, text)[0])
+
+    def write(self, text: str, x: float, y: float, color: Color | None = None) -> None:
+        """Text with its baseline's left end at a place."""
+        blf.size(_FONT, self.points)
+        blf.color(_FONT, *(color or self.text))
+        blf.position(_FONT, x, y, 0)
+        blf.draw(_FONT, text)
+
+
+def _corner(ink: _Ink) -> tuple[float, float]:
+    """The lower left corner of what no toolbar or header covers, and a margin."""
+    window = bpy.context.region
+    left, bottom = 0, 0
+    for region in bpy.context.area.regions:
+        if region.width <= 1 or region.height <= 1 or region == window:
+            continue
+        if region.type == "TOOLS" and region.alignment == "LEFT":
+            left = max(left, region.x + region.width - window.x)
+        elif region.alignment == "BOTTOM" and region.y <= window.y + 1:
+            bottom = max(bottom, region.y + region.height - window.y)
+    return left + ink.px(_MARGIN), bottom + ink.px(_MARGIN)
+
+
+def _draw_legend(ink: _Ink, legend: dict[str, Any], x: float, y: float) -> float:
+    """One legend with its lower left corner at a place; its width."""
+    px, pad, line = ink.px, ink.px(_PAD), ink.px(_LINE)
+    bar, swatches = legend["bar"], legend["swatches"]
+    marked = [legend["mark"]] if legend["mark"] else []
+    texts = [legend["title"], legend["subtitle"], legend["note"]]
+    beside = px(_BAR_WIDTH + _TICK + 5)
+    width = max(
+        *(ink.width(text) for text in texts),
+        *(beside + ink.width(text) for _, text in legend["ticks"]),
+        *(beside + ink.width("0.0000") + px(30) + ink.width(text) for _, text in marked),
+        *(px(_BAR_WIDTH + 6) + ink.width(text) for _, text in swatches),
+        px(110),
+    )
+    body = px(_BAR_HEIGHT) + line if bar else line * len(swatches)
+    height = 2 * line + body + (line if legend["note"] else 0) + 2 * pad
+    _box(x, y, width + 2 * pad, height, ink.back)
+
+    left, top = x + pad, y + height - pad
+    ink.write(legend["title"], left, top - px(12))
+    ink.write(legend["subtitle"], left, top - px(12) - line, ink.faint)
+    top -= 2 * line
+    if bar:
+        _draw_bar(ink, legend, left, top - line * 0.7 - px(_BAR_HEIGHT))
+    for color, text in swatches:
+        _box(left, top - px(13), px(_BAR_WIDTH), px(11), (*color, 1.0))
+        ink.write(text, left + px(_BAR_WIDTH + 6), top - px(12))
+        top -= line
+    if legend["note"]:
+        ink.write(legend["note"], left, y + pad + px(2), ink.faint)
+    return float(width + 2 * pad)
+
+
+def _draw_bar(ink: _Ink, legend: dict[str, Any], x: float, y: float) -> None:
+    """The color bar upwards from a place, its numbers, and the mark at the whole score."""
+    px = ink.px
+    width, height = px(_BAR_WIDTH), px(_BAR_HEIGHT)
+    colors = [(*color, 1.0) for color in legend["bar"]]
+    rows = np.linspace(y, y + height, len(colors)).tolist()
+    positions = [(at, row) for row in rows for at in (x, x + width)]
+    strip_colors = [color for color in colors for _ in (0, 1)]
+    _draw("TRI_STRIP", positions, strip_colors)
+    half = px(4)
+    for place, text in legend["ticks"]:
+        at = y + place * height
+        _box(x + width, at, px(_TICK), max(px(1), 1), ink.faint)
+        ink.write(text, x + width + px(_TICK + 5), at - half)
+    if legend["mark"]:
+        place, text = legend["mark"]
+        at, tip = y + place * height, x + width + px(_TICK + 10) + ink.width("0.0000")
+        corners = [(tip, at), (tip + px(7), at + px(5)), (tip + px(7), at - px(5))]
+        _draw("TRIS", corners, [ink.text] * 3)
+        ink.write(text, tip + px(12), at - half)
+
+
+def _draw_figure(ink: _Ink, shown: UnitFigure, x: float, y: float) -> None:
+    px, pad, line, side = ink.px, ink.px(_PAD), ink.px(_LINE), ink.px(_PANEL)
+    label = max(ink.width("Normal"), ink.width("Tangent")) + pad
+    width, height = label + 2 * side + 3 * pad, 2 * side + 2 * line + 3 * pad
+    _box(x, y, width, height, ink.back)
+    ink.write(shown.title, x + pad, y + height - pad - px(12))
+    for column, text in enumerate(("Reference", "Compared")):
+        ink.write(text, x + pad + label + column * (side + pad), y + height - pad - px(12) - line, ink.faint)
+    if not shown.batches:
+        shown.batches.extend(_picture_batch(picture) for picture in shown.pictures)
+    for row, text in enumerate(("Normal", "Tangent")):
+        bottom = y + pad + (1 - row) * (side + pad)
+        ink.write(text, x + pad, bottom + side / 2 - px(4), ink.faint)
+        for column in (0, 1):
+            left = x + pad + label + column * (side + pad)
+            with gpu.matrix.push_pop():
+                gpu.matrix.translate((left + side / 2, bottom + side / 2))
+                gpu.matrix.scale((side / 2, side / 2))
+                gpu.state.blend_set("ALPHA")
+                shown.batches[2 * row + column].draw(gpu.shader.from_builtin("SMOOTH_COLOR"))
+                gpu.state.blend_set("NONE")
+
+
+def _picture_batch(picture: UnitPicture) -> Any:
+    """Squares of one color for the pixels, and diamonds with a dark rim for the samples; in [-1, 1]."""
+    side = len(picture.colors)
+    visible = picture.colors[:, :, 3] > 0
+    row, column = np.nonzero(visible)
+    centers = np.stack([column, row], axis=1) * (2 / side) - 1 + 1 / side
+    square = np.array([(-1, -1), (1, -1), (1, 1), (-1, -1), (1, 1), (-1, 1)]) / side
+    diamond = np.array([(-1, 0), (0, -1), (1, 0), (-1, 0), (1, 0), (0, 1)]) * (2 * _DOT / _PANEL)
+    rim = np.full((len(picture.dots), 4), (0.05, 0.05, 0.05, 1.0))
+    dots = np.column_stack([picture.dot_colors, np.ones(len(picture.dots))])
+    positions = np.concatenate(
+        [
+            (centers[:, None] + square).reshape(-1, 2),
+            (picture.dots[:, None] + 1.7 * diamond).reshape(-1, 2),
+            (picture.dots[:, None] + diamond).reshape(-1, 2),
+        ]
+    )
+    colors = np.repeat(np.concatenate([picture.colors[row, column], rim, dots]), 6, axis=0)
+    shader = gpu.shader.from_builtin("SMOOTH_COLOR")
+    flat = np.column_stack([positions, np.zeros(len(positions))]).astype(np.float32)
+    return batch_for_shader(shader, "TRIS", {"pos": flat, "color": colors.astype(np.float32)})
+
+
+def _draw_marks() -> None:
+    """The chosen sample, its way to the surface and the rim of its tangent unit, seen through everything."""
+    if figure is None or figure.scene != bpy.context.scene.name or not bpy.context.space_data.overlay.show_overlays:
+        return
+    points = figure.lines.reshape(-1, 3).astype(np.float32)
+    shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
+    region = bpy.context.region
+    gpu.state.blend_set("ALPHA")
+    for width, color in ((4.0, (0.0, 0.0, 0.0, 0.6)), (1.6, (1.0, 1.0, 1.0, 1.0))):
+        shader.uniform_float("viewportSize", (region.width, region.height))
+        shader.uniform_float("lineWidth", width * bpy.context.preferences.system.ui_scale)
+        shader.uniform_float("color", color)
+        batch_for_shader(shader, "LINES", {"pos": points}).draw(shader)
+    gpu.state.blend_set("NONE")
+
+
+def _box(x: float, y: float, width: float, height: float, color: Color) -> None:
+    corners = [(x, y), (x + width, y), (x, y + height), (x + width, y + height)]
+    _draw("TRI_STRIP", corners, [color] * 4)
+
+
+def _draw(kind: str, positions: list[tuple[float, float]], colors: list[Color]) -> None:
+    shader = gpu.shader.from_builtin("SMOOTH_COLOR")
+    gpu.state.blend_set("ALPHA")
+    flat = [(x, y, 0.0) for x, y in positions]
+    batch_for_shader(shader, kind, {"pos": flat, "color": colors}).draw(shader)
+    gpu.state.blend_set("NONE")

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Scene.fmqm: all that the add-on keeps in a file, in one place."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import BoolProperty, CollectionProperty, EnumProperty, IntProperty, PointerProperty
+
+from .look import FMQMLook
+from .properties import FMQMItem, FMQMRow, FMQMSettings, is_asset
+
+
+def _can_be_picked(_: FMQMScene, object_: bpy.types.Object) -> bool:
+    return is_asset(object_)
+
+
+class FMQMScene(bpy.types.PropertyGroup):
+    """Inputs, settings, results and the look of them."""
+
+    reference_kind: EnumProperty(
+        name="Reference Kind",
+        description="What the reference is",
+        items=[
+            ("OBJECT", "Object", "A mesh, or an empty with its meshes", "OBJECT_DATA", 0),
+            ("COLLECTION", "Collection", "All meshes of a collection", "OUTLINER_COLLECTION", 1),
+        ],
+    )
+    reference: PointerProperty(
+        name="Reference",
+        description="The original. An empty stands for all meshes below it",
+        type=bpy.types.Object,
+        poll=_can_be_picked,
+    )
+    reference_collection: PointerProperty(
+        name="Reference Collection",
+        description="The original: all meshes of the collection as one object",
+        type=bpy.types.Collection,
+    )
+    bare_reference: BoolProperty(
+        name="Without Modifiers",
+        description="The reference is its mesh without modifiers. With the same object in the list, "
+        "this shows what its modifiers do",
+        default=False,
+    )
+    compared: CollectionProperty(name="Compared", description="What is scored against the reference", type=FMQMItem)
+    compared_index: IntProperty(name="Active Compared", description="Chosen row of the list", default=0, min=0)
+    settings: PointerProperty(name="Settings", description="How it is measured", type=FMQMSettings)
+    rows: CollectionProperty(name="Results", description="One row per compared object", type=FMQMRow)
+    row_index: IntProperty(name="Active Result", description="Chosen row of the results", default=0, min=0)
+    look: PointerProperty(name="Look", description="What of the chosen result is shown", type=FMQMLook)
+
+
+CLASSES = (FMQMScene,)
+
+
+def register() -> None:
+    bpy.types.Scene.fmqm = PointerProperty(name="FMQM", description="Mesh quality", type=FMQMScene)
+
+
+def unregister() -> None:
+    del bpy.types.Scene.fmqm

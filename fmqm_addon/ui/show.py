@@ -1,0 +1,466 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Puts what is remembered of a result row into the scene: between the session's arrays and blender.pointcloud."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+from numpy.typing import NDArray
+
+from ..blender import pointcloud, viewport
+from ..metric.errors import FMQMError
+from ..metric.score import Result
+from ..metric.spatial import Floats, Ints, cross
+from ..report import layers, probe
+from . import overlay, session
+
+if TYPE_CHECKING:
+    from .look import FMQMLook
+
+WORST_COUNT = 20
+POINT = 0.55  # usual radius of a point, in mean distances between neighbors
+LIFT = 0.002  # the painted copy lies this much above the surface, in diagonals, so as not to flicker
+SLICE_SIZE = 1.2  # in the longest side of the reference's box
+OUTLINE = 0.05  # encoded grey of the surface's cut in a slice
+FIGURE_SIDE = 48  # pixels of one picture of the figure of units
+AGAIN = "the samples are not in memory any longer; press Measure Quality again"
+
+_UID = "fmqm_uid"  # custom properties of our objects: the row, the layer's patch, the usual point size
+_SPACING = "fmqm_spacing"
+_SLICE_MATRIX = "fmqm_drawn_at"
+
+
+def look_of(scene: bpy.types.Scene) -> FMQMLook:
+    look: FMQMLook = scene.fmqm.look
+    return look
+
+
+def measured_row(scene: bpy.types.Scene) -> tuple[str, str, session.Measured]:
+    """Identifier and name of the chosen row, and what it was computed from.
+
+    Raises:
+        FMQMError: no row, or its samples are gone.
+    """
+    rows, index = scene.fmqm.rows, scene.fmqm.row_index
+    if not 0 <= index < len(rows):
+        raise FMQMError("there is no result yet; press Measure Quality first")
+    measured = session.get(rows[index].uid)
+    if measured is None:
+        raise FMQMError(f"{rows[index].name}: {AGAIN}")
+    return rows[index].uid, rows[index].name, measured
+
+
+# --- The cloud
+
+
+def show_cloud(scene: bpy.types.Scene) -> bpy.types.Object:
+    """The chosen row's samples as a cloud, colored by the chosen layer; replaces the one that is there.
+
+    Raises:
+        FMQMError: nothing to show.
+    """
+    uid, _, measured = measured_row(scene)
+    look = look_of(scene)
+    result = measured.comparison.result
+    spacing = float(np.sqrt(sum(patch.area for patch in result.patches) / len(result.samples.positions)))
+    cloud = pointcloud.build_cloud(
+        scene,
+        pointcloud.CLOUD,
+        "FMQM Cloud",
+        result.samples.positions,
+        _outwards(result),
+        cloud_matrix(measured, look.place),
+        look.point_size * POINT * spacing,
+    )
+    cloud.hide_select = True  # clicks go to the user's own objects
+    cloud[_UID], cloud[_SPACING] = uid, spacing
+    _fill_worst(look, result, uid)
+    _appear(cloud)
+    recolor_cloud(scene)
+    viewport.show_colors()
+    return cloud
+
+
+def recolor_cloud(scene: bpy.types.Scene) -> bool:
+    """Gives the cloud, if there is one, the colors and the legend of the chosen layer; False: its samples are gone."""
+    cloud = pointcloud.find_object(pointcloud.CLOUD)
+    if cloud is None:
+        return True
+    measured = session.get(cloud.get(_UID, ""))
+    if measured is None:
+        return False
+    look = look_of(scene)
+    result = measured.comparison.result
+    length = world_length(measured)
+    colors, ends = layers.sample_colors(result, look.layer, look.range == "FITTED", length)
+    pointcloud.recolor(cloud, colors)
+    _explain(scene, cloud, look.layer, ends, result, measured.comparison.distorted.name)
+    viewport.redraw()
+    return True
+
+
+def resize_cloud(scene: bpy.types.Scene) -> None:
+    cloud = pointcloud.find_object(pointcloud.CLOUD)
+    if cloud is not None:
+        pointcloud.resize(cloud, look_of(scene).point_size * POINT * cloud.get(_SPACING, 0.0))
+
+
+def move_cloud(scene: bpy.types.Scene) -> None:
+    """To the place that the look says."""
+    cloud = pointcloud.find_object(pointcloud.CLOUD)
+    measured = None if cloud is None else session.get(cloud.get(_UID, ""))
+    if cloud is not None and measured is not None:
+        cloud.matrix_world = Matrix(cloud_matrix(measured, look_of(scene).place).tolist())
+
+
+def cloud_matrix(measured: session.Measured, place: str) -> Floats:
+    """(4, 4) from the metric's frame to where a row's reference, or its compared object, stands."""
+    frame = measured.reference.frame
+    into = np.eye(4)
+    into[:3, :3] *= frame.scale
+    into[:3, 3] = frame.center
+    to_world = measured.reference_to_world if place == "REFERENCE" else measured.distorted_to_world
+    matrix: Floats = np.asarray(to_world, np.float64) @ into
+    return matrix
+
+
+def world_length(measured: session.Measured) -> float:
+    """Scene units of the metric's unit, the reference's diagonal."""
+    matrix = cloud_matrix(measured, "REFERENCE")
+    return float(np.cbrt(abs(np.linalg.det(matrix[:3, :3]))))
+
+
+def _outwards(result: Result) -> Floats:
+    """(N, 3) unit normals of the reference below the samples: along p - p_n, away from the inside."""
+    away = (result.samples.positions - result.ref.nearest) * np.where(result.ref.sdf < 0, -1.0, 1.0)[:, None]
+    length = np.linalg.norm(away, axis=1)
+    away[length == 0] = (0.0, 0.0, 1.0)
+    length[length == 0] = 1.0
+    normals: Floats = away / length[:, None]
+    return normals
+
+
+def _appear(object_: bpy.types.Object) -> None:
+    bpy.context.view_layer.update()
+    viewport.show_in_local_views(object_)
+
+
+def _explain(
+    scene: bpy.types.Scene,
+    object_: bpy.types.Object,
+    layer: str,
+    ends: tuple[float, float],
+    result: Result,
+    name: str,
+    note: str = "",
+) -> None:
+    """Stores the legend on the object, where drawing, saving and undo find it."""
+    units = scene.unit_settings
+
+    def length_text(value: float) -> str:
+        if units.system == "NONE":
+            return f"{value:.3g}"
+        text: str = bpy.utils.units.to_string(
+            units.system, "LENGTH", value * units.scale_length, precision=3, split_unit=False
+        )
+        return text
+
+    legend = layers.legend(layer, ends, name, result, length_text)
+    object_[overlay.LEGEND] = json.dumps(replace(legend, note=note or legend.note).as_dict())
+
+
+# --- The painted surface
+
+
+def paint_surface(scene: bpy.types.Scene) -> None:
+    """A copy of the reference's surface in the colors of the chosen layer.
+
+    Raises:
+        FMQMError: nothing to show.
+    """
+    uid, _, measured = measured_row(scene)
+    look = look_of(scene)
+    result = measured.comparison.result
+    length = world_length(measured)
+    distorted = measured.comparison.distorted
+    values, vertices = probe.surface_values(result, look.layer, measured.reference, distorted, length)
+    triangles = result.patch_mesh.triangles
+    ends = layers.value_range(look.layer, values, look.range == "FITTED", length)
+    painted = pointcloud.build_surface(
+        scene,
+        pointcloud.PAINTED,
+        "FMQM Painted",
+        vertices + LIFT * _vertex_normals(vertices, triangles),
+        triangles,
+        cloud_matrix(measured, look.place),
+    )
+    painted[_UID] = uid
+    pointcloud.recolor(painted, layers.layer_colors(look.layer, values, *ends))
+    _explain(scene, painted, look.layer, ends, result, distorted.name, "painted")
+    _appear(painted)
+    viewport.show_colors()
+    viewport.redraw()
+
+
+def _vertex_normals(vertices: Floats, triangles: Ints) -> Floats:
+    """(V, 3) area-weighted unit normals; zero where they cancel."""
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    face = cross(b - a, c - a)
+    normals = np.stack(
+        [np.bincount(triangles.ravel(), np.repeat(face[:, k], 3), len(vertices)) for k in range(3)], axis=1
+    )
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    unit: Floats = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
+    return unit
+
+
+# --- Worst places
+
+
+def focus_patch(scene: bpy.types.Scene, area: bpy.types.Area | None) -> None:
+    """Frames the chosen one of the worst patches and shows only its points.
+
+    Raises:
+        FMQMError: nothing to show.
+    """
+    look = look_of(scene)
+    uid, _, measured = measured_row(scene)
+    cloud = pointcloud.find_object(pointcloud.CLOUD)
+    if cloud is None or cloud.get(_UID) != uid:
+        cloud = show_cloud(scene)
+    if not 0 <= look.worst_index < len(look.worst):
+        raise FMQMError("the result has no patches")
+    patch = look.worst[look.worst_index].patch
+    result = measured.comparison.result
+    size = look.point_size * POINT * cloud[_SPACING]
+    pointcloud.resize(cloud, size, result.samples.patch == patch)
+    look.focused = True
+    center, diameter, normal = probe.patch_view(result, patch)
+    matrix = cloud_matrix(measured, look.place)
+    turned = np.linalg.inv(matrix[:3, :3]).T @ normal
+    length = float(np.linalg.norm(turned))
+    viewport.frame_place(
+        area,
+        matrix[:3, :3] @ center + matrix[:3, 3],
+        diameter * world_length(measured),
+        turned / length if length > 0 else turned,
+    )
+
+
+def show_all_patches(scene: bpy.types.Scene) -> None:
+    look = look_of(scene)
+    look.focused = False
+    cloud = pointcloud.find_object(pointcloud.CLOUD)
+    if cloud is not None:
+        shown = np.ones(len(cloud.data.vertices) // 4, bool)
+        pointcloud.resize(cloud, look.point_size * POINT * cloud.get(_SPACING, 0.0), shown)
+
+
+def _fill_worst(look: FMQMLook, result: Result, uid: str) -> None:
+    look.focused = False
+    if look.worst_uid == uid and len(look.worst):
+        return
+    look.worst.clear()
+    for worst in probe.worst_patches(result, WORST_COUNT):
+        item = look.worst.add()
+        item.name = f"Patch {worst.patch}"
+        item.patch, item.score, item.value = worst.patch, worst.score, worst.value
+        item.blame = f"{layers.LAYERS[worst.blame].label} {worst.value:.2f}"
+    look.worst_index = 0
+    look.worst_uid = uid
+
+
+# --- Shells, units, slices
+
+
+def show_shells(scene: bpy.types.Scene) -> None:
+    """Five layers of points at growing distances, colored by NCF.
+
+    Raises:
+        FMQMError: nothing to show.
+    """
+    uid, _, measured = measured_row(scene)
+    look = look_of(scene)
+    surface = measured.reference if look.shell_field == "REFERENCE" else measured.comparison.distorted
+    shells = probe.shell_points(surface, look.shell_points, look.shell_distance / 100)
+    positions = shells.positions.copy()
+    low, high = positions.min(axis=0), positions.max(axis=0)
+    shown = np.ones(len(positions), bool)
+    if look.shell_layout == "ROW":  # the world's X may be turned in the frame; the row runs along the frame's
+        positions[:, 0] += shells.shell * 1.1 * float(high[0] - low[0])
+    else:  # each shell ends before the one below it, so that all five are seen
+        place = (positions[:, 0] - low[0]) / max(float(high[0] - low[0]), 1e-12)
+        shown = place <= 1 - shells.shell / probe.SHELLS
+    colors = probe.fields_at(surface, shells.positions[shown]).ncf
+    area = float(measured.comparison.result.patch_mesh.area)
+    object_ = pointcloud.build_cloud(
+        scene,
+        pointcloud.SHELLS,
+        "FMQM Shells",
+        positions[shown],
+        shells.normals[shown],
+        cloud_matrix(measured, look.place),
+        POINT * float(np.sqrt(area / look.shell_points)),
+    )
+    object_[_UID] = uid
+    object_.hide_select = True
+    pointcloud.recolor(object_, colors.astype(np.float64))
+    step = world_length(measured) * look.shell_distance / 100
+    legend = layers.Legend(
+        f"{probe.SHELLS} Shells of {surface.name}", f"{step:.3g} apart", note="colors as in the textures"
+    )
+    object_[overlay.LEGEND] = json.dumps(legend.as_dict())
+    _appear(object_)
+    viewport.show_colors()
+    viewport.redraw()
+
+
+def show_slice(scene: bpy.types.Scene) -> bpy.types.Object:
+    """The slice plane, upright through the middle of the reference, or where the user has put it.
+
+    Raises:
+        FMQMError: nothing to show.
+    """
+    _, _, measured = measured_row(scene)
+    into = cloud_matrix(measured, "REFERENCE")
+    corners = measured.reference.vertices @ into[:3, :3].T + into[:3, 3]
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    side = SLICE_SIZE * float((high - low).max())
+    matrix = np.eye(4)
+    matrix[:3, :3] = side * np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])  # faces the front, -Y
+    matrix[:3, 3] = (low + high) / 2
+    plane = pointcloud.build_slice(scene, "FMQM Slice", matrix, int(look_of(scene).slice_resolution))
+    _appear(plane)
+    draw_slice(scene)
+    return plane
+
+
+def draw_slice(scene: bpy.types.Scene) -> None:
+    """Draws the chosen field where the slice is now.
+
+    Raises:
+        FMQMError: nothing to show.
+    """
+    plane = pointcloud.find_object(pointcloud.SLICE)
+    if plane is None:
+        return
+    _, name, measured = measured_row(scene)
+    look = look_of(scene)
+    resolution = plane.data.size[0]
+    to_frame = np.linalg.inv(cloud_matrix(measured, "REFERENCE")) @ np.array(plane.matrix_world, np.float64)
+    points = probe.slice_points(to_frame, resolution)
+    ref = probe.fields_at(measured.reference, points)
+    dist = probe.fields_at(measured.comparison.distorted, points)
+    length = world_length(measured)
+    values = layers.field_values(look.slice_layer, ref, dist, length)
+    ends = layers.value_range(look.slice_layer, values, look.range == "FITTED", length)
+    colors = layers.layer_colors(look.slice_layer, values, *ends).copy()
+    cut = dist.sdf if look.slice_layer.endswith("COMPARED") else ref.sdf
+    colors[_borders((cut < 0).reshape(resolution, resolution)).ravel()] = OUTLINE
+    pointcloud.draw_slice(plane, colors)
+    plane[_SLICE_MATRIX] = _flat(plane)
+    which = "compared" if look.slice_layer.endswith("COMPARED") else "reference"
+    _explain(scene, plane, look.slice_layer, ends, measured.comparison.result, name, f"dark line: {which}")
+    viewport.redraw()
+
+
+def slice_has_moved() -> bool:
+    """Whether the slice is elsewhere than where it was drawn; cheap enough for each drawing of the view."""
+    plane = pointcloud.find_object(pointcloud.SLICE)
+    return plane is not None and _SLICE_MATRIX in plane and list(plane[_SLICE_MATRIX]) != _flat(plane)
+
+
+def _flat(object_: bpy.types.Object) -> list[float]:
+    return [value for row in object_.matrix_world for value in row]
+
+
+def _borders(inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(H, W) the pixels whose right or upper neighbor is on the other side."""
+    border = np.zeros_like(inside)
+    border[:, :-1] |= inside[:, :-1] != inside[:, 1:]
+    border[:-1] |= inside[:-1] != inside[1:]
+    return border
+
+
+def show_unit(scene: bpy.types.Scene, sample: int) -> None:
+    """The figure of one sample's units, over the viewport.
+
+    Raises:
+        FMQMError: nothing to show.
+    """
+    _, name, measured = measured_row(scene)
+    result = measured.comparison.result
+    sample %= len(result.samples.positions)
+    unit = probe.unit_of(result, sample)
+    pictures = []
+    for tangent in (False, True):
+        for surface, fields in ((measured.reference, result.ref), (measured.comparison.distorted, result.dist)):
+            pixels, inside, dots, members = probe.unit_grid(result, unit, tangent, FIGURE_SIDE)
+            colors = np.zeros((FIGURE_SIDE * FIGURE_SIDE, 4), np.float32)
+            colors[inside, :3] = probe.fields_at(surface, pixels[inside]).ncf
+            colors[inside, 3] = 1.0
+            shape = (FIGURE_SIDE, FIGURE_SIDE, 4)
+            pictures.append(overlay.UnitPicture(colors.reshape(shape), dots, fields.ncf[members].astype(np.float64)))
+    look = look_of(scene)
+    matrix = cloud_matrix(measured, look.place)
+    lines = probe.unit_lines(result, unit) @ matrix[:3, :3].T + matrix[:3, 3]
+    title = f"Sample {sample} of {name}"
+    overlay.figure = overlay.UnitFigure(title, tuple(pictures), scene.name, lines)  # type: ignore[arg-type]
+    look.unit_sample = sample
+    viewport.redraw()
+
+
+def step_unit(scene: bpy.types.Scene, step: int) -> None:
+    """The figure of the sample so many of the metric's color units after the last one.
+
+    Raises:
+        FMQMError: nothing to show.
+    """
+    _, _, measured = measured_row(scene)
+    units = np.flatnonzero(measured.comparison.result.samples.unit)
+    place = int(np.searchsorted(units, look_of(scene).unit_sample))
+    show_unit(scene, int(units[(place + step) % len(units)]))
+
+
+def nearest_sample(
+    scene: bpy.types.Scene,
+    region: bpy.types.Region,
+    view: bpy.types.RegionView3D,
+    at: tuple[float, float],
+    reach: float,
+) -> int | None:
+    """The sample below a place of a view: of those within reach, in pixels, the foremost."""
+    _, _, measured = measured_row(scene)
+    matrix = np.array(view.perspective_matrix, np.float64) @ cloud_matrix(measured, look_of(scene).place)
+    positions = measured.comparison.result.samples.positions
+    projected = positions @ matrix[:, :3].T + matrix[:, 3]
+    depth = projected[:, 3]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        x = (projected[:, 0] / depth + 1) / 2 * region.width - at[0]
+        y = (projected[:, 1] / depth + 1) / 2 * region.height - at[1]
+        near = np.flatnonzero((depth > 0) & (x * x + y * y < reach * reach))
+    if not near.size:
+        return None
+    front = projected[near, 2] / depth[near]
+    return int(near[front.argmin()])
+
+
+# --- Away with it
+
+
+def clear() -> int:
+    """Removes all of it from the file and gives the views their settings back; how many data-blocks there were."""
+    overlay.figure = None
+    count = pointcloud.clear()
+    viewport.restore_colors()
+    viewport.redraw()
+    return count
+
+
+def anything() -> bool:
+    return overlay.figure is not None or pointcloud.anything() or viewport.colors_changed()

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Notices that what was measured has changed since, and marks its rows.
+
+Handlers only note that something has changed; some time after the last change a timer compares fingerprints.
+There is nobody to see marks without a window, and a handler left in bpy 4.5 keeps Python from ending: none there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ..blender.job import pair_fingerprint
+from ..blender.snapshot import Target
+from . import session
+from .properties import FMQMRow
+
+_WATCHED = (bpy.types.Object, bpy.types.Mesh, bpy.types.Material, bpy.types.NodeTree, bpy.types.Image)
+_DELAY = 0.7  # seconds without a change before the rows are looked at
+
+
+def row_targets(row: FMQMRow) -> tuple[Target, Target]:
+    """What the row compared: the reference and the other."""
+    return (
+        Target(row.reference_kind, row.reference_name, row.bare_reference),
+        Target(row.kind, row.name),
+    )
+
+
+def check(scene: bpy.types.Scene) -> None:
+    """Brings session.stale up to date for the rows of a scene."""
+    for row in scene.fmqm.rows:
+        if row.error:
+            continue
+        reference, target = row_targets(row)
+        was = row.fingerprint.partition(" ")[::2]
+        now = pair_fingerprint(reference, target, row.space)
+        parts = []
+        for asset, before, after in ((reference, was[0], now[0]), (target, was[1], now[1])):
+            if not after:
+                parts.append(f"{asset.name} is gone")
+            elif before != after:
+                parts.append(f"{asset.name} has changed")
+        if parts:
+            session.stale[row.uid] = " and ".join(dict.fromkeys(parts))
+        else:
+            session.stale.pop(row.uid, None)
+
+
+def redraw() -> None:
+    """The sidebars of all windows."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                area.tag_redraw()
+
+
+def _check_all() -> None:
+    if session.job is not None:
+        return  # the end of the job asks again
+    for scene in bpy.data.scenes:
+        check(scene)
+    redraw()
+
+
+def soon() -> None:
+    """Asks for a check a little later; a change in between puts it off."""
+    if bpy.app.background:
+        return
+    if bpy.app.timers.is_registered(_check_all):
+        bpy.app.timers.unregister(_check_all)
+    bpy.app.timers.register(_check_all, first_interval=_DELAY)
+
+
+def _kept(handler: Callable[..., None]) -> Callable[..., None]:
+    """Blender's decorator, with types: the handler outlives the opening of another file."""
+    kept: Callable[..., None] = persistent(handler)
+    return kept
+
+
+@_kept
+def _on_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    if not scene.fmqm.rows:
+        return
+    for update in depsgraph.updates:
+        if isinstance(update.id, _WATCHED):
+            soon()
+            return
+
+
+@_kept
+def _on_undo(*_: object) -> None:
+    soon()
+
+
+@_kept
+def _before_load(*_: object) -> None:
+    _stop_job()
+
+
+@_kept
+def _after_load(*_: object) -> None:
+    session.clear()
+    soon()
+
+
+def _stop_job() -> None:
+    if session.job is not None:
+        session.job.stop()
+
+
+_HANDLERS = (
+    ("depsgraph_update_post", _on_change),
+    ("undo_post", _on_undo),
+    ("redo_post", _on_undo),
+    ("load_pre", _before_load),
+    ("load_post", _after_load),
+)
+
+
+def register() -> None:
+    if bpy.app.background:
+        return
+    for name, handler in _HANDLERS:
+        getattr(bpy.app.handlers, name).append(handler)
+
+
+def unregister() -> None:
+    for name, handler in reversed(_HANDLERS):
+        handlers = getattr(bpy.app.handlers, name)
+        if handler in handlers:
+            handlers.remove(handler)
+    if bpy.app.timers.is_registered(_check_all):
+        bpy.app.timers.unregister(_check_all)
+    _stop_job()
+    session.clear()
