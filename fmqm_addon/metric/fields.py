@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .spatial import Floats, Ints, closest_on_triangles
-from .surface import Surface
+from .spatial import Floats, Ints, closest_on_triangles, dot, ranges
+from .surface import Surface, triangle_normals
 
 # Below the resolution of a float32 tree in a box of diagonal 1, p - p_n has no direction: p = p_n.
 ON_SURFACE = 1e-9
@@ -73,6 +73,7 @@ def evaluate_fields(
             yield 0.35 * looked_up / len(points)
 
     nearest, weights = _closest(surface, points, triangle)
+    _settle_ties(surface, points, triangle, nearest, weights)
     away = points - nearest
     distance = np.linalg.norm(away, axis=1)
     on_surface = distance <= ON_SURFACE
@@ -115,6 +116,52 @@ def count_crossings(surface: Surface, origins: Floats, directions: Floats) -> In
         last[rays] = triangle
         travelled[rays] += distance + step[rays]
     return count
+
+
+def _settle_ties(surface: Surface, points: Floats, triangle: Ints, nearest: Floats, weights: Floats) -> None:
+    """Where p_n lies on an edge or vertex, its triangle becomes the one there that faces p most; in place.
+
+    All of them are equally near, but across a UV seam their colors differ: which one a tree happens to
+    find first, in the order of a file, must not decide. (No such rule in the paper, which has no ties.)
+    """
+    rows = np.flatnonzero((weights[:, 0] == 0) | (weights[:, 1] == 0) | (weights[:, 2] == 0))
+    if not rows.size:
+        return
+    by_weight = np.argsort(weights[rows], axis=1)
+    corners = np.take_along_axis(surface.triangles[triangle[rows]], by_weight, axis=1)
+    pivot = corners[:, 2]
+    on_edge = weights[rows, by_weight[:, 1]] > 0
+    second = np.where(on_edge, corners[:, 1], pivot)  # of a vertex's triangles all count, of an edge's those with both
+
+    face, first, last = _faces_around(surface.triangles, pivot)
+    row = np.repeat(np.arange(len(rows)), last - first)
+    face = face[ranges(first, last)]
+    a, b, c = surface.triangles[face].T
+    with_both = (a == second[row]) | (b == second[row]) | (c == second[row])
+    row, face = row[with_both], face[with_both]
+
+    candidates, candidate_weights = _closest(surface, points[rows[row]], face)
+    away = points[rows[row]] - candidates
+    distance = np.sqrt(dot(away, away))
+    facing = np.abs(dot(away, triangle_normals(surface.vertices, surface.triangles[face])))
+    start = np.flatnonzero(np.diff(row, prepend=-1))
+    least = np.minimum.reduceat(distance, start)
+    facing[distance > least[row] + ON_SURFACE] = -1.0
+    is_best = facing == np.maximum.reduceat(facing, start)[row]
+    _, winner = np.unique(row[is_best], return_index=True)
+    chosen = np.flatnonzero(is_best)[winner]
+    triangle[rows], nearest[rows], weights[rows] = face[chosen], candidates[chosen], candidate_weights[chosen]
+
+
+def _faces_around(triangles: Ints, vertices: Ints) -> tuple[Ints, Ints, Ints]:
+    """Faces around some vertices: those of vertices[k] are faces[first[k] : last[k]]."""
+    asked = np.zeros(int(triangles.max()) + 1, bool)
+    asked[vertices] = True
+    face, corner = np.nonzero(asked[triangles])
+    around = triangles[face, corner]
+    order = np.argsort(around, kind="stable")
+    around = around[order]
+    return face[order], np.searchsorted(around, vertices), np.searchsorted(around, vertices, side="right")
 
 
 def _coarse_to_fine(order: Ints) -> list[Ints]:

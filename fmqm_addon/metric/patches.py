@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .settings import Settings
-from .spatial import Floats, Ints, dot, morton_order
+from .spatial import Floats, Ints, dot, morton_order, ranges
 from .surface import Surface, triangle_areas
 
 FPS_TIE = 1e-5  # V-B: distances this close, relatively, are equal; the lowest vertex index wins
@@ -181,7 +181,7 @@ def grow_patches(mesh: PatchMesh, centers: Ints, n_patches: int) -> Iterator[Pat
         frontier = np.array([center])
         seen_vertex[center] = number
         while area < target and frontier.size:
-            faces = _gather(incident, start, frontier)
+            faces = incident[ranges(start[frontier], start[frontier + 1])]
             faces = _once(faces[seen_face[faces] != number], scratch)
             seen_face[faces] = number
             rings.append(faces)
@@ -215,13 +215,6 @@ def _incident_faces(mesh: PatchMesh) -> tuple[Ints, Ints]:
     start = np.zeros(len(mesh.vertices) + 1, np.int64)
     np.cumsum(np.bincount(corners, minlength=len(mesh.vertices)), out=start[1:])
     return incident, start
-
-
-def _gather(values: Ints, start: Ints, rows: Ints) -> Ints:
-    """Concatenated values[start[r] : start[r + 1]] of the rows."""
-    counts = start[rows + 1] - start[rows]
-    ends = np.cumsum(counts)
-    return values[np.arange(ends[-1]) + np.repeat(start[rows] - ends + counts, counts)]
 
 
 def _once(values: Ints, scratch: Ints) -> Ints:

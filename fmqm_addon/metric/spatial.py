@@ -25,6 +25,13 @@ def dot(a: Floats, b: Floats) -> Floats:
     return np.einsum("ij,ij->i", a, b)
 
 
+def ranges(first: Ints, last: Ints) -> Ints:
+    """The whole numbers first[0] .. last[0] - 1, first[1] .. last[1] - 1, and so on, in one array."""
+    counts = last - first
+    ends = np.cumsum(counts)
+    return np.arange(counts.sum()) + np.repeat(first - ends + counts, counts)
+
+
 def morton_order(points: Floats) -> Ints:
     """(N,) indices that put (N, 3) points along a Z-order curve: neighbours in the order are near in space."""
     low = points.min(axis=0)

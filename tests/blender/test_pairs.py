@@ -130,34 +130,17 @@ def fast(request: pytest.FixtureRequest, shared_data: Path) -> tuple[Path, MeshA
     return path, mesh, prepared(mesh, FAST)
 
 
-SEAMS = pytest.mark.xfail(
-    reason="low_poly_tree: every edge is a UV seam between two colors, so ties of nearest points show", strict=False
-)
-
-
-def expect_ties(request: pytest.FixtureRequest, mesh: MeshArrays) -> None:
-    if mesh.name == "low_poly_tree.obj":
-        request.applymarker(SEAMS)
-
-
-def test_another_order_is_the_same_mesh(
-    request: pytest.FixtureRequest, fast: tuple[Path, MeshArrays, Measurement]
-) -> None:
+def test_another_order_is_the_same_mesh(fast: tuple[Path, MeshArrays, Measurement]) -> None:
     _, mesh, measurement = fast
-    expect_ties(request, mesh)
     mine = scores(measurement, shuffled(mesh))
     print(mesh.name, 1 - mine)
     assert (1 - mine <= SAME_CONTENT).all() and (mine <= 1).all()
 
 
 @pytest.mark.parametrize("kind", ["obj", "ply", "glb", "fbx", "usdc", "blend"])
-def test_another_format_is_the_same_mesh(
-    request: pytest.FixtureRequest, fast: tuple[Path, MeshArrays, Measurement], tmp_path: Path, kind: str
-) -> None:
+def test_another_format_is_the_same_mesh(fast: tuple[Path, MeshArrays, Measurement], tmp_path: Path, kind: str) -> None:
     """PLY names no image; it gets the same one by hand."""
     path, mesh, measurement = fast
-    if kind in {"ply", "glb", "usdc"}:
-        expect_ties(request, mesh)
     open_file(str(path))
     again = load_mesh(str(scenes.export(tmp_path, kind)), mesh.colors[0] if kind == "ply" else None)
     mine = scores(measurement, again)

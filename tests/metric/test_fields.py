@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from fmqm_addon.metric.color import PlainColor
 from fmqm_addon.metric.fields import Fields, _coarse_to_fine, _guide, count_crossings, evaluate_fields
 from fmqm_addon.metric.spatial import Floats, Ints, morton_order
-from fmqm_addon.metric.surface import Surface
+from fmqm_addon.metric.surface import MeshArrays, Surface, prepare_surface
 
 from .meshes import TETRAHEDRON, cube, grid, icosahedron, sphere, surface, texture
-from .oracles import exact_distance, texture_color, winding_number
+from .oracles import NaiveQuery, exact_distance, texture_color, winding_number
 
 seeds = st.integers(0, 2**32 - 1)
 CLOSED = {"tetrahedron": TETRAHEDRON, "cube": cube(1), "cut cube": cube(2), "icosahedron": icosahedron()}
@@ -188,3 +188,24 @@ def test_the_sphere_is_round() -> None:
     for r in (0.3, 1.5, 4.0):
         sdf = fields_at(shape, directions * r * radius).sdf
         assert ((sdf / radius >= r - 1 - 1e-9) & (sdf / radius <= r - 0.9)).all()
+
+
+@given(seeds)
+def test_ties_on_edges_do_not_depend_on_the_order_of_triangles(seed: int) -> None:
+    """A ridge whose sides have different colors: what is nearest to its edge takes the side that faces it more."""
+    rng = np.random.default_rng(seed)
+    positions = np.array([[0, 0, 0.5], [1, 0, 0.5], [0, -1, 0], [1, -1, 0], [0, 1, 0], [1, 1, 0.0]])
+    triangles = np.array([[0, 2, 1], [1, 2, 3], [0, 1, 4], [1, 5, 4]])
+    colors = (PlainColor((1, 0, 0)), PlainColor((0, 0, 1)))
+    points = rng.uniform([0.1, -0.2, 0.6], [0.9, 0.2, 0.9], (40, 3))
+    order = rng.permutation(4)
+    found = []
+    for rows in (np.arange(4), order):
+        corners = np.stack([np.roll(row, rng.integers(3)) for row in triangles[rows]])
+        mesh = MeshArrays("ridge", positions, corners, np.zeros((4, 3, 2)), np.array([0, 0, 1, 1])[rows], colors)
+        prepared = prepare_surface(mesh, NaiveQuery)
+        found.append(fields_at(prepared, prepared.frame.enter(points)))
+    np.testing.assert_array_equal(found[0].ncf, found[1].ncf)
+    above = np.abs(points[:, 1]) < (points[:, 2] - 0.5) / 2 * 0.9  # nearest to the edge itself
+    assert above.any()
+    np.testing.assert_array_equal(found[0].ncf[above, 0] == 1, points[above, 1] < 0)
