@@ -4,6 +4,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Literal
+
+import numpy as np
 
 from ..metric.errors import FileError
 
@@ -46,7 +49,7 @@ def check_ply(path: str) -> None:
     with open(path, "rb") as file:
         data = file.read()
     header, _, _ = data.partition(b"end_header")
-    order = "big" if b"format binary_big_endian" in header else "little"
+    order: Literal["little", "big"] = "big" if b"format binary_big_endian" in header else "little"
     if not data.startswith(b"ply") or b"format binary_" not in header or len(header) == len(data):
         return  # text, whose end the importer notices, or what it refuses anyway
     position = data.find(b"\n", len(header)) + 1
@@ -54,6 +57,10 @@ def check_ply(path: str) -> None:
         for count, properties in _ply_elements(header.decode("latin-1")):
             if all(count_bytes == 0 for count_bytes, _ in properties):
                 position += count * sum(value_bytes for _, value_bytes in properties)
+                continue
+            alike = _alike(data, position, count, properties, order)
+            if alike is not None:
+                position += alike
                 continue
             for _ in range(count):
                 for count_bytes, value_bytes in properties:
@@ -67,9 +74,28 @@ def check_ply(path: str) -> None:
         raise FileError(f"{path}: the PLY file is truncated")
 
 
+def _alike(
+    data: bytes, position: int, count: int, properties: list[tuple[int, int]], order: Literal["little", "big"]
+) -> int | None:
+    """Bytes of elements whose lists are all as long as the first one's, as in a mesh of triangles; None for others."""
+    size = 0
+    counts: list[int] = []  # where in an element the bytes of its lists' lengths stand
+    for count_bytes, value_bytes in properties:
+        start = position + size
+        length = int.from_bytes(data[start : start + count_bytes], order) if count_bytes else 1
+        counts += range(size, size + count_bytes)
+        size += count_bytes + length * value_bytes
+    if position + count * size > len(data) or not count:
+        return None
+    elements = np.frombuffer(data, np.uint8, count * size, position).reshape(count, size)
+    lengths = elements.take(counts, axis=1)
+    return count * size if (lengths == lengths[0]).all() else None
+
+
 def _ply_elements(header: str) -> Iterator[tuple[int, list[tuple[int, int]]]]:
     """Count and properties of each element: bytes of a list's length, 0 for a single value, and of a value."""
-    count, properties = 0, []
+    count = 0
+    properties: list[tuple[int, int]] = []
     for words in (line.split() for line in header.splitlines()):
         if words[:1] == ["element"]:
             yield count, properties
