@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from ..metric.errors import MeshError
-from ..metric.score import Evaluation, Progress, Result, Stepper, Work
+from ..metric.score import Evaluation, Progress, Result, Stepper, Work, as_work
 from ..metric.settings import Settings
 from ..metric.spatial import Floats
-from ..metric.surface import MeshArrays, Surface, prepare_surface
+from ..metric.surface import MeshArrays, Surface, preparing_surface
 from .bvh import BVHQuery
 
 
@@ -54,7 +54,7 @@ class Measurement:
 
     def _prepare(self) -> Work[None]:
         yield Progress("prepare", 0.0)
-        surface = prepare_surface(self._mesh, BVHQuery)
+        surface = yield from as_work(preparing_surface(self._mesh, BVHQuery), "prepare", 0.0, 0.05)
         yield Progress("prepare", 0.05)
         for repeat in range(self._repeats):
             evaluation = Evaluation(surface, self._settings.with_seed(self._settings.seed + repeat))
@@ -63,7 +63,8 @@ class Measurement:
 
     def _compare(self, distorted: MeshArrays) -> Work[Comparison]:
         yield Progress("prepare", 0.0)
-        surface = prepare_surface(distorted, BVHQuery, self.reference.frame)
+        preparing = preparing_surface(distorted, BVHQuery, self.reference.frame)
+        surface = yield from as_work(preparing, "prepare", 0.0, 0.05)
         yield Progress("prepare", 0.05)
         results = []
         for repeat, evaluation in enumerate(self._evaluations):

@@ -20,7 +20,8 @@ RAY_STEP = 1e-6
 BOUND_SLACK, BOUND_MARGIN = 1e-4, 1e-6
 # Every so many-th point is looked up first; its triangle bounds the distance of the points after it.
 _STRIDES = (64, 8, 1)
-_BATCH = 4096
+_BATCH = 4096  # queries of a step
+_SURFACE_BATCH = 32768  # points of a step that asks no tree
 
 
 @dataclass(frozen=True)
@@ -53,45 +54,51 @@ def evaluate_fields(
     The tree says which triangle is nearest and what a ray hits; where on the triangle, and how far, is
     computed here in float64.
     """
+    triangle = yield from _nearest_triangles(surface, points, order, reach)
+    nearest = np.empty_like(points)
+    ncf = np.empty(points.shape, np.float32)
+    for first in range(0, len(order), _SURFACE_BATCH):
+        batch = order[first : first + _SURFACE_BATCH]
+        triangle[batch], nearest[batch], weights = _settled(surface, points[batch], triangle[batch])
+        ncf[batch] = surface.color_at(triangle[batch], weights)
+        yield 0.35 + 0.1 * (first + len(batch)) / len(order)
+    away = points - nearest
+    sdf = np.sqrt(dot(away, away))
+    on_surface = sdf <= ON_SURFACE
+    nearest[on_surface] = points[on_surface]
+    sdf[on_surface] = 0.0
+
+    off_surface = order[~on_surface[order]]
+    for first in range(0, len(off_surface), _BATCH):
+        batch = off_surface[first : first + _BATCH]
+        crossings = count_crossings(surface, points[batch], away[batch] / sdf[batch, None])
+        sdf[batch[crossings % 2 == 1]] *= -1
+        yield 0.45 + 0.55 * (first + len(batch)) / len(off_surface)
+    return Fields(nearest, triangle, sdf, ncf)
+
+
+def _nearest_triangles(
+    surface: Surface, points: Floats, order: Ints, reach: Floats | None
+) -> Generator[float, None, Ints]:
+    """(N,) the triangle that is nearest to each point, up to float32; yields 0 to 0.35."""
     triangle = np.empty(len(points), np.int64)
     rounds = [order] if reach is not None else _coarse_to_fine(order)
     looked_up = 0
     for index, chosen in enumerate(rounds):
-        if reach is not None:
-            bounds = reach[chosen]
-        elif index == 0:
-            bounds = np.full(len(chosen), np.inf)
-        else:
-            bounds = np.linalg.norm(
-                points[chosen] - _closest(surface, points[chosen], triangle[_guide(order, index)])[0], axis=1
-            )
-        bounds = bounds * (1 + BOUND_SLACK) + BOUND_MARGIN
+        guides = _guide(order, index) if index else chosen
         for first in range(0, len(chosen), _BATCH):
             batch = chosen[first : first + _BATCH]
-            triangle[batch] = surface.query.nearest(points[batch], bounds[first : first + _BATCH])
+            if reach is not None:
+                bounds = reach[batch]
+            elif index == 0:
+                bounds = np.full(len(batch), np.inf)
+            else:
+                guide = triangle[guides[first : first + _BATCH]]
+                bounds = np.linalg.norm(points[batch] - _closest(surface, points[batch], guide)[0], axis=1)
+            triangle[batch] = surface.query.nearest(points[batch], bounds * (1 + BOUND_SLACK) + BOUND_MARGIN)
             looked_up += len(batch)
             yield 0.35 * looked_up / len(points)
-
-    nearest, weights = _closest(surface, points, triangle)
-    _settle_ties(surface, points, triangle, nearest, weights)
-    away = points - nearest
-    distance = np.linalg.norm(away, axis=1)
-    on_surface = distance <= ON_SURFACE
-    nearest[on_surface] = points[on_surface]
-    distance[on_surface] = 0.0
-    ncf = surface.color_at(triangle, weights).astype(np.float32)
-    yield 0.4
-
-    off_surface = order[~on_surface[order]]
-    directions = away[off_surface] / distance[off_surface, None]
-    crossings = np.empty(len(off_surface), np.int64)
-    for first in range(0, len(off_surface), _BATCH):
-        rays = slice(first, first + _BATCH)
-        crossings[rays] = count_crossings(surface, points[off_surface[rays]], directions[rays])
-        yield 0.4 + 0.6 * min(first + _BATCH, len(off_surface)) / len(off_surface)
-    sdf = distance
-    sdf[off_surface[crossings % 2 == 1]] *= -1
-    return Fields(nearest, triangle, sdf, ncf)
+    return triangle
 
 
 def count_crossings(surface: Surface, origins: Floats, directions: Floats) -> Ints:
@@ -118,15 +125,17 @@ def count_crossings(surface: Surface, origins: Floats, directions: Floats) -> In
     return count
 
 
-def _settle_ties(surface: Surface, points: Floats, triangle: Ints, nearest: Floats, weights: Floats) -> None:
-    """Where p_n lies on an edge or vertex, its triangle becomes the one there that faces p most; in place.
+def _settled(surface: Surface, points: Floats, triangle: Ints) -> tuple[Ints, Floats, Floats]:
+    """Triangle, p_n and its barycentric weights, given the nearest triangles as a tree found them.
 
-    All of them are equally near, but across a UV seam their colors differ: which one a tree happens to
-    find first, in the order of a file, must not decide. (No such rule in the paper, which has no ties.)
+    Where p_n lies on an edge or vertex, its triangle becomes the one there that faces p most. All of them
+    are equally near, but across a UV seam their colors differ: which one a tree happens to find first, in
+    the order of a file, must not decide. (The paper has no rule for ties.)
     """
+    nearest, weights = _closest(surface, points, triangle)
     rows = np.flatnonzero((weights[:, 0] == 0) | (weights[:, 1] == 0) | (weights[:, 2] == 0))
     if not rows.size:
-        return
+        return triangle, nearest, weights
     by_weight = np.argsort(weights[rows], axis=1)
     corners = np.take_along_axis(surface.triangles[triangle[rows]], by_weight, axis=1)
     pivot = corners[:, 2]
@@ -150,7 +159,9 @@ def _settle_ties(surface: Surface, points: Floats, triangle: Ints, nearest: Floa
     is_best = facing == np.maximum.reduceat(facing, start)[row]
     _, winner = np.unique(row[is_best], return_index=True)
     chosen = np.flatnonzero(is_best)[winner]
+    triangle = triangle.copy()
     triangle[rows], nearest[rows], weights[rows] = face[chosen], candidates[chosen], candidate_weights[chosen]
+    return triangle, nearest, weights
 
 
 def _faces_around(triangles: Ints, vertices: Ints) -> tuple[Ints, Ints, Ints]:

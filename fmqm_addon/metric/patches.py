@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,11 +60,11 @@ class Patch:
     extended: bool
 
 
-def build_patch_mesh(surface: Surface, n_patches: int) -> PatchMesh:
+def build_patch_mesh(surface: Surface, n_patches: int) -> Generator[float, None, PatchMesh]:
     """Triangles of the reference, with the edges of large ones split where one patch would be too coarse.
 
     If any triangle is larger than S_global / n_patches, the edges of all above S_global / (4 n_patches)
-    are halved until none is; otherwise nothing changes.
+    are halved until none is; otherwise nothing changes. Yields after each round of halving.
     """
     vertices, triangles = surface.vertices, surface.triangles
     parent = np.arange(len(triangles))
@@ -77,6 +77,7 @@ def build_patch_mesh(surface: Surface, n_patches: int) -> PatchMesh:
             vertices, triangles, cut_from = split_edges(vertices, triangles, areas > limit)
             parent = parent[cut_from]
             areas = triangle_areas(vertices, triangles)
+            yield 0.5
     return PatchMesh(vertices, triangles, areas, parent, was_split)
 
 

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .color import channel_weights, channels
 from .errors import MeshError
@@ -145,7 +144,7 @@ class Evaluation:
 
     def _prepare(self) -> Work[None]:
         settings = self.settings
-        mesh = build_patch_mesh(self.reference, settings.patches)
+        mesh = yield from as_work(build_patch_mesh(self.reference, settings.patches), "prepare", 0.0, 0.05)
         yield Progress("prepare", 0.05)
         centers = choose_centers(mesh.vertices, settings)
         yield Progress("prepare", 0.1)
@@ -174,12 +173,14 @@ class Evaluation:
                 "with the nearest triangles (loose parts)"
             )
         reach = np.abs(samples.offset)  # a sample is this near to the face it was drawn on
-        ref = yield from _evaluate(self.reference, samples, order, reach, 0.4, 1.0)
+        fields = evaluate_fields(self.reference, samples.positions, order, reach)
+        ref = yield from as_work(fields, "fields", 0.4, 1.0)
         self._prepared = _Prepared(mesh, tuple(patches), mesh.vertices[centers], samples, order, ref, tuple(warnings))
 
     def _compare(self, prepared: _Prepared, distorted: Surface) -> Work[Result]:
         settings, samples = self.settings, prepared.samples
-        dist = yield from _evaluate(distorted, samples, prepared.order, None, 0.0, 0.8)
+        fields = evaluate_fields(distorted, samples.positions, prepared.order)
+        dist = yield from as_work(fields, "fields", 0.0, 0.8)
         weights = channel_weights(settings.color_space)
         channels_r, channels_d = (channels(field.ncf, settings.color_space) for field in (prepared.ref, dist))
         diagonals = np.array([patch.diagonal for patch in prepared.patches])
@@ -215,17 +216,15 @@ class Evaluation:
         )
 
 
-def _evaluate(
-    surface: Surface, samples: Samples, order: Ints, reach: NDArray[np.float64] | None, first: float, last: float
-) -> Work[Fields]:
-    work = evaluate_fields(surface, samples.positions, order, reach)
+def as_work(work: Generator[float, None, T], stage: str, first: float, last: float) -> Work[T]:
+    """Something that yields its own share done, as the part of a stepper's work from first to last."""
     while True:
         try:
             done = next(work)
         except StopIteration as end:
-            fields: Fields = end.value
-            return fields
-        yield Progress("fields", first + (last - first) * done)
+            result: T = end.value
+            return result
+        yield Progress(stage, first + (last - first) * done)
 
 
 def _in_diagonals(fields: Fields, values: Floats, here: slice, diagonal: Floats) -> FieldValues:

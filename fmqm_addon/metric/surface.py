@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from .color import Color
 from .errors import MeshError
 from .spatial import Floats, Ints, cross, dot
+
+T = TypeVar("T")
 
 # Heights of triangles below this many float64 roundings of the position count as zero area.
 FLAT_ROUNDINGS = 8
@@ -110,7 +112,24 @@ class Surface:
 
 
 def prepare_surface(mesh: MeshArrays, build_query: QueryBuilder, frame: Frame | None = None) -> Surface:
-    """Weld, drop what cannot be measured, move to the metric's frame, index.
+    """preparing_surface, run to its end."""
+    return finish(preparing_surface(mesh, build_query, frame))
+
+
+def finish(work: Generator[Any, None, T]) -> T:
+    """What a generator returns once it has yielded all it has."""
+    while True:
+        try:
+            next(work)
+        except StopIteration as end:
+            result: T = end.value
+            return result
+
+
+def preparing_surface(
+    mesh: MeshArrays, build_query: QueryBuilder, frame: Frame | None = None
+) -> Generator[float, None, Surface]:
+    """Weld, drop what cannot be measured, move to the metric's frame, index; yields the share done.
 
     Args:
         frame: the reference's; None makes the frame from this mesh, which is then the reference.
@@ -138,12 +157,17 @@ def prepare_surface(mesh: MeshArrays, build_query: QueryBuilder, frame: Frame | 
     if not np.isfinite(world).all():
         finite = np.isfinite(world).all(axis=1)
         keep(finite[triangles].all(axis=1), "have coordinates that are not finite")
+    yield 0.1
     world, triangles = _used_only(world, triangles)
     if frame is None:
         frame = _frame_of(world, mesh.name)
+    yield 0.2
     positions, triangles = weld(frame.enter(world), triangles)
+    yield 0.4
     keep(~_is_flat(positions, triangles, frame), "have zero area")
+    yield 0.5
     keep(_is_first(triangles), "repeat another triangle")
+    yield 0.6
     vertices, triangles = _used_only(positions, triangles)
 
     uv = np.asarray(mesh.uv, np.float64)[source]
@@ -151,6 +175,7 @@ def prepare_surface(mesh: MeshArrays, build_query: QueryBuilder, frame: Frame | 
         strange = np.count_nonzero(~np.isfinite(uv).all(axis=(1, 2)))
         warnings.append(f"{mesh.name}: {strange} triangles have UVs that are not finite; taken as 0")
         uv = np.where(np.isfinite(uv), uv, 0.0)
+    yield 0.7
     return Surface(
         name=mesh.name,
         frame=frame,

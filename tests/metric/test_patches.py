@@ -20,7 +20,7 @@ from fmqm_addon.metric.patches import (
 )
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.spatial import Floats, Ints
-from fmqm_addon.metric.surface import triangle_areas, triangle_normals
+from fmqm_addon.metric.surface import finish, triangle_areas, triangle_normals
 
 from .meshes import TETRAHEDRON, TRIANGLE, cube, grid, icosahedron, sphere, surface
 from .oracles import farthest_points_by_loop, grow_with_sets
@@ -198,7 +198,7 @@ def test_patches_do_not_see_each_other() -> None:
 def test_split_patches_of_closed_meshes(shape: tuple[Floats, Ints], n_patches: int) -> None:
     """Same surface, still closed, nothing above a quarter of a patch; or nothing changes at all."""
     prepared = surface(shape)
-    mesh = build_patch_mesh(prepared, n_patches)
+    mesh = finish(build_patch_mesh(prepared, n_patches))
     before = triangle_areas(prepared.vertices, prepared.triangles)
     target = before.sum() / n_patches
     if before.max() <= target * (1 + 1e-9):
@@ -258,7 +258,7 @@ def test_split_edges_of_any_choice(seed: int, name: str) -> None:
 
 def test_an_open_triangle_is_split_until_it_makes_patches() -> None:
     prepared = surface(TRIANGLE)
-    mesh = build_patch_mesh(prepared, 10)
+    mesh = finish(build_patch_mesh(prepared, 10))
     assert mesh.was_split
     assert mesh.areas.max() <= mesh.area / 40 * (1 + 1e-9)
     assert (mesh.parent == 0).all()
@@ -271,7 +271,7 @@ def test_one_large_triangle_among_small_ones() -> None:
     vertices, triangles = grid(8, 8)
     far = np.array([[20, 0, 0], [30, 0, 0], [20, 10, 0]], float)
     prepared = surface((np.concatenate([vertices, far]), np.concatenate([triangles, [[81, 82, 83]]])))
-    mesh = build_patch_mesh(prepared, 10)
+    mesh = finish(build_patch_mesh(prepared, 10))
     assert mesh.was_split
     pieces = np.bincount(mesh.parent)
     assert pieces[-1] >= 20
@@ -282,14 +282,14 @@ def test_no_split_when_the_largest_triangle_is_just_a_patch() -> None:
     """Twenty equal triangles and twenty patches: equal up to rounding is not larger."""
     for scale in (1, 0.1, 1e-6 / 3):
         positions, triangles = icosahedron()
-        assert not build_patch_mesh(surface((positions * scale, triangles)), 20).was_split
-    assert build_patch_mesh(surface(icosahedron()), 21).was_split
+        assert not finish(build_patch_mesh(surface((positions * scale, triangles)), 20)).was_split
+    assert finish(build_patch_mesh(surface(icosahedron()), 21)).was_split
 
 
 def test_slivers_can_be_split() -> None:
     """A triangle that is almost a line ends in small triangles all the same."""
     positions = np.array([[0, 0, 0], [1, 0.3, 0.2], [0.5, 0.15, 0.1 + 1e-9], [0.5, 0.7, 0.1]])
-    mesh = build_patch_mesh(surface((positions, np.array([[0, 1, 2], [0, 2, 3]]))), 20)
+    mesh = finish(build_patch_mesh(surface((positions, np.array([[0, 1, 2], [0, 2, 3]]))), 20))
     assert mesh.areas.max() <= mesh.area / 80 * (1 + 1e-9)
-    thin = build_patch_mesh(surface((positions[:3], np.array([[0, 1, 2]]))), 20)
+    thin = finish(build_patch_mesh(surface((positions[:3], np.array([[0, 1, 2]]))), 20))
     assert thin.areas.max() <= thin.area / 80 * 1.01

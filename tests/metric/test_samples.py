@@ -15,7 +15,7 @@ from fmqm_addon.metric.patches import Patch, PatchMesh, build_patch_mesh, choose
 from fmqm_addon.metric.samples import PatchSamples, draw_samples, join_samples, sample_count
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.spatial import Ints
-from fmqm_addon.metric.surface import triangle_normals
+from fmqm_addon.metric.surface import finish, triangle_normals
 
 from .meshes import SMALL, TETRAHEDRON, cube, grid, sphere, surface
 
@@ -56,7 +56,7 @@ def test_every_patch_gets_samples() -> None:
     """At the least permitted density no patch is left with fewer than its even share, up to rounding."""
     for shape in (TETRAHEDRON, cube(3), grid(7, 3), sphere()):
         settings = Settings(samples=32 * 17, patches=17)
-        mesh = build_patch_mesh(surface(shape), 17)
+        mesh = finish(build_patch_mesh(surface(shape), 17))
         counts = [sample_count(patch, mesh.area, settings) for patch in patches_of(mesh, settings)]
         assert min(counts) >= 31
         assert max(counts) <= 35
@@ -67,7 +67,7 @@ def test_faces_get_floor_or_ceiling_of_their_share(seed: int, patches: int) -> N
     """N_f = S_f / S_local N_local, by systematic resampling; and all of N_local."""
     positions, triangles = cube(3)
     positions = positions + np.random.default_rng(seed).normal(0, 0.08, positions.shape)
-    mesh = build_patch_mesh(surface((positions, triangles)), patches)
+    mesh = finish(build_patch_mesh(surface((positions, triangles)), patches))
     settings = Settings(samples=64 * patches, patches=patches, seed=seed)
     for patch in patches_of(mesh, settings)[:3]:
         drawn = draw_samples(mesh, patch, mesh.area, settings)
@@ -83,7 +83,7 @@ def test_faces_get_floor_or_ceiling_of_their_share(seed: int, patches: int) -> N
 @given(seeds)
 def test_samples_stand_over_their_faces(seed: int) -> None:
     """Less its offset along the unit normal, a sample lies in its face."""
-    mesh = build_patch_mesh(surface(sphere()), 5)
+    mesh = finish(build_patch_mesh(surface(sphere()), 5))
     settings = Settings(samples=640, patches=5, seed=seed)
     patch = patches_of(mesh, settings)[seed % 5]
     drawn = draw_samples(mesh, patch, mesh.area, settings)
@@ -96,7 +96,7 @@ def test_samples_stand_over_their_faces(seed: int) -> None:
 
 
 def big_draw(seed: int = 0, sigma: float = 0.05) -> tuple[PatchMesh, Patch, PatchSamples]:
-    mesh = build_patch_mesh(surface(TETRAHEDRON), 1)
+    mesh = finish(build_patch_mesh(surface(TETRAHEDRON), 1))
     settings = Settings(samples=40_000, patches=1, seed=seed, sigma=sigma)
     patch = patches_of(mesh, settings)[0]
     return mesh, patch, draw_samples(mesh, patch, mesh.area, settings)
@@ -126,7 +126,7 @@ def test_places_in_a_face_are_uniform() -> None:
 
 def test_faces_get_their_share_on_average() -> None:
     """Faces of less than one sample are not forgotten, over many seeds."""
-    mesh = build_patch_mesh(surface(cube(6)), 1)
+    mesh = finish(build_patch_mesh(surface(cube(6)), 1))
     settings = Settings(samples=100, patches=1)
     patch = patches_of(mesh, settings)[0]
     draws = [draw_samples(mesh, patch, mesh.area, settings.with_seed(seed)).face for seed in range(400)]
@@ -147,7 +147,7 @@ def test_sigma_scales_the_offsets_and_nothing_else() -> None:
 
 def test_a_patchs_samples_depend_on_seed_and_center_alone() -> None:
     """Neither on the other patches nor on their order."""
-    mesh = build_patch_mesh(surface(cube(3)), 10)
+    mesh = finish(build_patch_mesh(surface(cube(3)), 10))
     centers = choose_centers(mesh.vertices, SMALL)
 
     def draw(order: Ints, settings: Settings = SMALL) -> dict[int, PatchSamples]:
@@ -166,7 +166,7 @@ def test_a_patchs_samples_depend_on_seed_and_center_alone() -> None:
 @pytest.mark.parametrize("wanted", [1, 20, 64, 70, 500])
 def test_color_units_are_drawn_without_replacement(wanted: int) -> None:
     """All samples, if the patch has fewer."""
-    mesh = build_patch_mesh(surface(cube(3)), 10)
+    mesh = finish(build_patch_mesh(surface(cube(3)), 10))
     settings = replace(SMALL, color_units=wanted)
     for patch in patches_of(mesh, settings):
         drawn = draw_samples(mesh, patch, mesh.area, settings)
@@ -179,7 +179,7 @@ def test_color_units_are_drawn_without_replacement(wanted: int) -> None:
 
 def test_a_patch_without_samples_is_empty_and_nothing_worse() -> None:
     """The least permitted density rules it out in a run; the parts bear it."""
-    mesh = build_patch_mesh(surface(cube(2)), 1)
+    mesh = finish(build_patch_mesh(surface(cube(2)), 1))
     patch = Patch(0, np.array([3, 5]), 1e-9, 0.5, False)
     drawn = draw_samples(mesh, patch, mesh.area, Settings(samples=32, patches=1))
     assert len(drawn.positions) == len(drawn.units) == 0
@@ -190,7 +190,7 @@ def test_a_patch_without_samples_is_empty_and_nothing_worse() -> None:
 
 
 def test_joined_samples_are_patch_after_patch() -> None:
-    mesh = build_patch_mesh(surface(cube(3)), 10)
+    mesh = finish(build_patch_mesh(surface(cube(3)), 10))
     parts = [draw_samples(mesh, patch, mesh.area, SMALL) for patch in patches_of(mesh, SMALL)]
     joined = join_samples(parts)
     assert joined.patch.dtype == np.int32
@@ -212,7 +212,7 @@ def test_counts_are_the_same_far_from_the_origin() -> None:
     places = here.vertices[choose_centers(here.vertices, Settings(scored_patches=20))]
     counts = []
     for shape in (here, away):
-        mesh = build_patch_mesh(shape, 250)
+        mesh = finish(build_patch_mesh(shape, 250))
         centers = [int(np.linalg.norm(mesh.vertices - place, axis=1).argmin()) for place in places]
         patches = grow_patches(mesh, np.array(centers), 250)
         counts.append([sample_count(patch, mesh.area, Settings()) for patch in patches])
