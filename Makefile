@@ -9,10 +9,19 @@ VERSION = $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2]
 VENV = .venv/$(VERSION)
 RUN = $(VENV)/bin/python
 
-.PHONY: demo test test-all bench lint clean
+# Blender's own tool for extensions, which needs no Blender.
+EXTENSION_TOOL = $(RUN) $(wildcard $(VENV)/lib/python*/site-packages/bpy/*/scripts/addons_core/bl_pkg/cli/blender_ext.py)
+
+.PHONY: demo extension test test-all bench lint clean
 
 demo: $(VENV)/runs
 	$(RUN) scripts/demo.py --out out/demo
+
+# dist/fmqm-<version>.zip, to drop into Blender's window.
+extension: $(VENV)/runs
+	mkdir -p dist
+	$(EXTENSION_TOOL) build --source-dir . --output-dir dist
+	$(EXTENSION_TOOL) validate dist/fmqm-$$(sed -n 's/^version = "\(.*\)"/\1/p' blender_manifest.toml).zip
 
 test: $(VENV)/tests
 	$(RUN) -m pytest $(ARGS)

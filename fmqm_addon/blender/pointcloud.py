@@ -28,8 +28,8 @@ _FACES = np.array([(0, 1, 2), (0, 3, 1), (0, 2, 3), (1, 3, 2)], np.int32)
 
 
 def find_object(kind: str) -> bpy.types.Object | None:
-    """Our object of a kind, in any scene of this file."""
-    return next((o for o in bpy.data.objects if o.library is None and o.get(TAG) == kind), None)
+    """Our object of a kind, in any scene of this file; asked at each drawing, so it looks at few objects."""
+    return next((o for c in _ours(bpy.data.collections) for o in c.objects if o.get(TAG) == kind), None)
 
 
 def build_cloud(
@@ -81,21 +81,13 @@ def resize(object_: bpy.types.Object, size: float, shown: NDArray[np.bool_] | No
     """
     mesh: bpy.types.Mesh = object_.data
     corners = np.empty((len(mesh.vertices) // 4, 4, 3), np.float32)
-    mesh.vertices.foreach_get("co", corners.reshape(-1))
+    mesh.attributes["position"].data.foreach_get("vector", corners.reshape(-1))  # vertices.co is slower
     if shown is None:
         shown = (corners[:, 0] != corners[:, 1]).any(axis=1)
     centers = corners.mean(axis=1, keepdims=True)
     corners = centers + np.where(shown, np.float32(size), np.float32(0))[:, None, None] * _CORNERS
-    mesh.vertices.foreach_set("co", corners.ravel())
+    mesh.attributes["position"].data.foreach_set("vector", corners.ravel())
     mesh.update()
-
-
-def centers_of(object_: bpy.types.Object) -> NDArray[np.float32]:
-    """(N, 3) where the points of a cloud are, in its own space."""
-    corners = np.empty((len(object_.data.vertices) // 4, 4, 3), np.float32)
-    object_.data.vertices.foreach_get("co", corners.reshape(-1))
-    centers: NDArray[np.float32] = corners.mean(axis=1)
-    return centers
 
 
 def build_slice(scene: bpy.types.Scene, name: str, matrix: Floats, resolution: int) -> bpy.types.Object:
@@ -116,6 +108,7 @@ def build_slice(scene: bpy.types.Scene, name: str, matrix: Floats, resolution: i
         object_.data[TAG] = SLICE
         if image is not None:
             bpy.data.images.remove(image)
+            object_.data.name = name  # the name was the old image's until now
     _link(scene, object_)
     return object_
 
@@ -126,17 +119,6 @@ def draw_slice(object_: bpy.types.Object, colors: Floats) -> None:
     pixels[:, :3] = colors
     object_.data.pixels.foreach_set(pixels.ravel())
     object_.data.update()
-
-
-def remove(kind: str) -> None:
-    """Removes our objects of a kind with their data, and what nothing of ours needs any longer."""
-    for object_ in [o for o in _ours(bpy.data.objects) if o[TAG] == kind]:
-        data = object_.data
-        bpy.data.objects.remove(object_)
-        if data is not None and not data.users:
-            (bpy.data.images if isinstance(data, bpy.types.Image) else bpy.data.meshes).remove(data)
-    if not any(_ours(bpy.data.objects)):
-        clear()
 
 
 def clear() -> int:
@@ -206,7 +188,7 @@ def _mesh(name: str, vertices: NDArray[np.float32], triangles: NDArray[np.int32]
     """A smooth mesh with a white color attribute; foreach_set is the only quick way."""
     mesh = bpy.data.meshes.new(name)
     mesh.vertices.add(len(vertices))
-    mesh.vertices.foreach_set("co", vertices.ravel())
+    mesh.attributes["position"].data.foreach_set("vector", vertices.ravel())
     mesh.loops.add(triangles.size)
     mesh.loops.foreach_set("vertex_index", triangles.ravel())
     mesh.polygons.add(len(triangles))

@@ -12,35 +12,56 @@ from mathutils import Matrix, Vector
 
 from ..metric.spatial import Floats
 
-# On a Screen, which undo does not touch and which is saved with the views: color types before ours.
-_BEFORE = "fmqm_color_types"
-_ATTRIBUTE = "VERTEX"
+# On a Screen, which undo does not touch and which is saved with the views: what we changed, and from what.
+_BEFORE = "fmqm_shading"
+# Solid shading shows the color attribute, in the light made for judging painted colors: the usual one
+# shows less than half of a color's brightness, and legends would not match.
+_OURS = {"color_type": "VERTEX", "studio_light": "paint.sl"}
 _MARGIN = 1.9  # view distance in diameters of what is framed, at Blender's usual focal length
 
 
 def show_colors() -> None:
-    """Sets the color of Solid shading to Attribute in every 3D view; restore_colors() undoes it."""
+    """Has Solid shading show color attributes in every 3D view; restore_colors() undoes it."""
     for screen in bpy.data.screens:
         before = json.loads(screen.get(_BEFORE, "{}"))
         for key, space in _spaces(screen):
-            if space.shading.color_type != _ATTRIBUTE:
-                before[key] = space.shading.color_type
-                space.shading.color_type = _ATTRIBUTE
+            shading = space.shading
+            for name, value in _OURS.items():
+                # The light's name is Solid's only while Solid is on; flat light and matcaps are the user's choice.
+                if name == "studio_light" and (shading.type, shading.light) != ("SOLID", "STUDIO"):
+                    continue
+                was = getattr(shading, name)
+                if was != value and _set(shading, name, value):
+                    before.setdefault(key, {}).setdefault(name, was)
         if before:
             screen[_BEFORE] = json.dumps(before)
 
 
 def restore_colors() -> None:
-    """Gives every 3D view the color it had; a view that was split off since gets its screen's."""
+    """Gives every 3D view the shading it had; a view that was split off since gets its screen's."""
     for screen in bpy.data.screens:
         if _BEFORE not in screen:
             continue
         before = json.loads(screen[_BEFORE])
         usual = next(iter(before.values()))
         for key, space in _spaces(screen):
-            if space.shading.color_type == _ATTRIBUTE:  # else the user has chosen since
-                space.shading.color_type = before.get(key, usual)
+            shading, kind = space.shading, space.shading.type
+            if kind != "SOLID":
+                shading.type = "SOLID"
+            for name, was in before.get(key, usual).items():
+                if getattr(shading, name) == _OURS[name]:  # else the user has chosen since
+                    _set(shading, name, was)
+            if kind != "SOLID":
+                shading.type = kind
         del screen[_BEFORE]
+
+
+def _set(shading: bpy.types.View3DShading, name: str, value: str) -> bool:
+    try:
+        setattr(shading, name, value)
+    except TypeError:  # an installation without that light
+        return False
+    return True
 
 
 def colors_changed() -> bool:

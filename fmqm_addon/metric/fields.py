@@ -20,8 +20,8 @@ RAY_STEP = 1e-6
 BOUND_SLACK, BOUND_MARGIN = 1e-4, 1e-6
 # Every so many-th point is looked up first; its triangle bounds the distance of the points after it.
 _STRIDES = (64, 8, 1)
-_BATCH = 4096  # queries of a step
-_SURFACE_BATCH = 32768  # points of a step that asks no tree
+_BATCH = 2048  # queries of a step
+_SURFACE_BATCH = 16384  # points of a step that asks no tree
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,9 @@ NO_PATCH = (0.62, 0.63, 0.65)  # of a place that no scored patch covers
 # From score 0 to score 1: bad is hot and bright, good is dark (inferno without its ends).
 SCORE_COLORS = ("#f9dd4c", "#fbb418", "#f8850f", "#e65d2f", "#cb4149", "#a62c60", "#7f1e6c", "#56106e", "#280b54")
 
-# From far inside over the surface to far outside: blue and orange differ to every eye, and both ends are dark.
-SIGNED_COLORS = ("#0b3c6f", "#2f74ad", "#84b5d9", "#f2f0eb", "#e8a567", "#bb5d1c", "#6b2c06")
+# From the surface inwards and outwards: blue and orange differ to every eye; both begin at the same white.
+INSIDE_COLORS = ("#f2f0eb", "#84b5d9", "#2f74ad", "#0b3c6f")
+OUTSIDE_COLORS = ("#f2f0eb", "#e8a567", "#bb5d1c", "#6b2c06")
 
 # Okabe and Ito's, for a few kinds of things.
 GREY_LIGHT, GREY_DARK, VERMILION, SKY = (0.80, 0.81, 0.83), (0.42, 0.44, 0.48), (0.84, 0.37, 0.0), (0.34, 0.71, 0.91)
@@ -31,7 +32,10 @@ def score_colors(scores: Floats) -> Floats:
 
 def signed_colors(values: Floats) -> Floats:
     """(N, 3) colors in [0, 1] of (N,) values from -1 (blue) over 0 (white) to 1 (orange); NO_PATCH for nan."""
-    return _in_table((np.asarray(values) + 1) / 2, _table(SIGNED_COLORS))
+    colors = _in_table(values, _table(OUTSIDE_COLORS))
+    inside = np.flatnonzero(values < 0)
+    colors[inside] = _in_table(-values[inside], _table(INSIDE_COLORS))
+    return colors
 
 
 def number_colors(numbers: Ints) -> Floats:

@@ -13,7 +13,7 @@ from ..metric.fields import Fields, evaluate_fields
 from ..metric.score import COLUMNS, Result
 from ..metric.spatial import Floats, Ints, dot, morton_order
 from ..metric.surface import Surface, triangle_areas, triangle_normals
-from .layers import LAYERS, NUMBER, field_values
+from .layers import LAYERS, NUMBER
 
 SHELLS = 5  # as in the supplement's figure
 _CHUNK = 1 << 22  # elements of a distance table at once
@@ -59,42 +59,29 @@ def patch_view(result: Result, patch: int) -> tuple[Floats, float, Floats]:
     return (low + high) / 2, float(np.linalg.norm(high - low)), normal / length if length > 0 else normal
 
 
-def surface_values(
-    result: Result, name: str, reference: Surface, distorted: Surface, length: float
-) -> tuple[Floats, Floats]:
-    """A layer on the reference's surface, at the vertices of result.patch_mesh.
+def blended_scores(result: Result, name: str) -> Floats:
+    """A layer that is per patch on the reference's surface, at the (V,) vertices of result.patch_mesh.
 
     Scores go smoothly from patch to patch: a Gaussian mean of the patches around, by the distance to
-    their centers in their own size. The other layers are the fields at the vertices themselves.
-
-    Args:
-        length: scene units of the metric's unit.
-
-    Returns:
-        (V,) or (V, 3) values as of report.layers.layer_values, and (V, 3) the vertices, metric's frame.
+    their centers in their own size. For the number of the patch, it is the one that weighs most.
     """
     vertices = result.patch_mesh.vertices
-    layer = LAYERS[name]
-    if layer.per_patch:
-        return _blend(result, name, vertices, nearest=layer.kind == NUMBER), vertices
-    ref, dist = fields_at(reference, vertices), fields_at(distorted, vertices)
-    return field_values(name, ref, dist, length), vertices
-
-
-def _blend(result: Result, name: str, points: Floats, nearest: bool) -> Floats:
-    """(V,) Gaussian means over the patches; with nearest, the number of the patch that weighs most."""
-    scores = None if nearest else result.patch_scores[:, COLUMNS.index(name)].astype(np.float32)
+    scores = None if LAYERS[name].kind == NUMBER else result.patch_scores[:, COLUMNS.index(name)].astype(np.float32)
     centers = result.patch_centers.astype(np.float32)
     width = np.array([patch.diagonal for patch in result.patches], np.float32) / 4
-    values = np.empty(len(points))
+    values = np.empty(len(vertices))
     step = max(1, _CHUNK // len(centers))
-    for first in range(0, len(points), step):
-        here = points[first : first + step].astype(np.float32)
-        squared = ((here[:, None, :] - centers) ** 2).sum(axis=2) / (2 * width * width)
-        squared -= squared.min(axis=1, keepdims=True)  # far from every center the nearest still counts
+    for first in range(0, len(vertices), step):
+        here = vertices[first : first + step].astype(np.float32)
+        squared = np.zeros((len(here), len(centers)), np.float32)
+        for k in range(3):
+            gap = here[:, k, None] - centers[:, k]
+            squared += gap * gap
+        squared /= 2 * width * width
         if scores is None:
             values[first : first + step] = squared.argmin(axis=1)
             continue
+        squared -= squared.min(axis=1, keepdims=True)  # far from every center the nearest still counts
         weight = np.exp(-squared)
         values[first : first + step] = weight @ scores / weight.sum(axis=1)
     return values

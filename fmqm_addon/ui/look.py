@@ -29,19 +29,25 @@ _STATUS = "Click: Choose Sample    Esc, Right Click: Finish"
 
 _LAYER_ITEMS = [(layer.name, layer.label, layer.description) for layer in layers.LAYERS.values()]
 _FIELD_ITEMS = [item for item in _LAYER_ITEMS if not layers.LAYERS[item[0]].per_patch]
-_focusing = False  # the list's index is being set by an operator, which frames the view itself
 
 
 def _recolor(look: FMQMLook, _: bpy.types.Context) -> None:
-    scene = look.id_data
-    show.recolor_cloud(scene)
-    if pointcloud.find_object(pointcloud.PAINTED) is not None:
-        _quietly(lambda: show.paint_surface(scene))
-    _draw_slice(look, _)
+    show.recolor_cloud(look.id_data)
+    show.recolor_painted(look.id_data)
+
+
+def _rerange(look: FMQMLook, context: bpy.types.Context) -> None:
+    _recolor(look, context)
+    _draw_slice(look, context)
 
 
 def _draw_slice(look: FMQMLook, _: bpy.types.Context) -> None:
     _quietly(lambda: show.draw_slice(look.id_data))
+
+
+def _rebuild_slice(look: FMQMLook, _: bpy.types.Context) -> None:
+    if pointcloud.find_object(pointcloud.SLICE) is not None:
+        _quietly(lambda: show.show_slice(look.id_data))
 
 
 def _resize(look: FMQMLook, _: bpy.types.Context) -> None:
@@ -53,7 +59,7 @@ def _move(look: FMQMLook, _: bpy.types.Context) -> None:
 
 
 def _focus(look: FMQMLook, context: bpy.types.Context) -> None:
-    if not _focusing:
+    if not show.choosing:
         _quietly(lambda: show.focus_patch(look.id_data, context.area))
 
 
@@ -86,14 +92,14 @@ class FMQMLook(bpy.types.PropertyGroup):
             ("FIXED", "Fixed", "0 to 1 for scores and colors; 1 or 2 % of the reference's size for distances"),
             ("FITTED", "Fitted", "The values that occur, so that small differences show"),
         ],
-        update=_recolor,
+        update=_rerange,
     )
     place: EnumProperty(
         name="Place",
         description="Where the points are shown",
         items=[
-            ("REFERENCE", "At Reference", "Where the reference stands"),
-            ("COMPARED", "At Compared", "Where the compared object stands"),
+            ("REFERENCE", "Reference", "Where the reference stands"),
+            ("COMPARED", "Compared", "Where the compared object stands"),
         ],
         update=_move,
     )
@@ -146,14 +152,9 @@ class FMQMLook(bpy.types.PropertyGroup):
             ("256", "256", "Fine"),
             ("512", "512", "Very fine; slow to move"),
         ],
-        default="192",
-        update=lambda look, _: _quietly(lambda: _rebuild_slice(look.id_data)),
+        default="128",
+        update=_rebuild_slice,
     )
-
-
-def _rebuild_slice(scene: bpy.types.Scene) -> None:
-    if pointcloud.find_object(pointcloud.SLICE) is not None:
-        show.show_slice(scene)
 
 
 # --- Operators
@@ -221,19 +222,14 @@ class FMQM_OT_worst_step(_Shows, bpy.types.Operator):  # noqa: N801
         return f"Frame the {which} of the lowest patches and show only its points"
 
     def act(self, context: bpy.types.Context) -> None:
-        global _focusing
         look = show.look_of(context.scene)
         uid, _, _ = show.measured_row(context.scene)
         fresh = not look.focused or look.worst_uid != uid
-        _focusing = True
-        try:
-            if look.worst_uid != uid or pointcloud.find_object(pointcloud.CLOUD) is None:
-                show.show_cloud(context.scene)
-            if not fresh and look.worst:  # the first press shows the worst one
-                look.worst_index = (look.worst_index + self.step) % len(look.worst)
-            show.focus_patch(context.scene, context.area)
-        finally:
-            _focusing = False
+        if look.worst_uid != uid or pointcloud.find_object(pointcloud.CLOUD) is None:
+            show.show_cloud(context.scene)
+        if not fresh and look.worst:  # the first press shows the worst one
+            show.choose_worst(look, (look.worst_index + self.step) % len(look.worst))
+        show.focus_patch(context.scene, context.area)
 
 
 class FMQM_OT_worst_all(bpy.types.Operator):  # noqa: N801
@@ -389,11 +385,11 @@ class FMQM_UL_worst(bpy.types.UIList):  # noqa: N801
     def draw_item(  # Blender counts the arguments
         self, _context: Any, layout: Any, _data: Any, item: Any, _icon: int, _active: Any, _property: str
     ) -> None:
-        split = layout.split(factor=0.34)
-        split.label(text=item.name)
-        split = split.split(factor=0.32)
+        split = layout.split(factor=0.24)
         split.label(text=f"{item.score:.3f}")
+        split = split.split(factor=0.72)
         split.label(text=item.blame)
+        split.label(text=f"#{item.patch}")
 
     def draw_filter(self, _context: bpy.types.Context, _layout: Any) -> None:
         """Twenty rows in their order need no filter."""

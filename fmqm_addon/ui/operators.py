@@ -38,6 +38,7 @@ from .properties import (
 from .scene import FMQMScene
 
 SLICE = 0.035  # seconds of work per tick of the timer: the window stays smooth
+SHOWN_EVERY = 0.2  # seconds between redraws of the progress
 TICK = 0.005  # seconds between ticks, for Blender to draw and listen
 
 # What an artist should know of each number: label, and what a low value looks like.
@@ -276,6 +277,7 @@ class FMQM_OT_measure(bpy.types.Operator):  # noqa: N801
     _stepper: Stepper[list[Outcome]]
     _job: session.Job
     _scene: str
+    _shown: float = 0.0
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -330,9 +332,7 @@ class FMQM_OT_measure(bpy.types.Operator):  # noqa: N801
             job.stop()
             raise
         if more:
-            job.progress, job.text = self._stepper.progress.done, self._stepper.progress.stage
-            context.workspace.status_text_set(f"FMQM: {job.text}, {100 * job.progress:.0f} %        Esc: Cancel")
-            watch.redraw()
+            self._show(context, job)
             return {"PASS_THROUGH"}
         job.stop()
         return self._finish(context)
@@ -349,6 +349,17 @@ class FMQM_OT_measure(bpy.types.Operator):  # noqa: N801
             more = self._stepper.step()
         session.longest_tick = max(session.longest_tick, time.perf_counter() - began)
         return more
+
+    def _show(self, context: bpy.types.Context, job: session.Job) -> None:
+        """Progress in sidebar and status bar, some times a second."""
+        progress = self._stepper.progress
+        job.progress = progress.done
+        now = time.perf_counter()
+        if progress.stage == job.text and now - self._shown < SHOWN_EVERY:
+            return
+        self._shown, job.text = now, progress.stage
+        context.workspace.status_text_set(f"FMQM: {job.text}, {100 * job.progress:.0f} %        Esc: Cancel")
+        watch.redraw()
 
     def _prepare(self, context: bpy.types.Context) -> bool:
         fmqm = context.scene.fmqm

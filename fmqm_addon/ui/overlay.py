@@ -27,7 +27,7 @@ _MARGIN, _PAD, _LINE, _GAP = 14, 10, 17, 8  # pixels at a UI scale of 1
 _BAR_WIDTH, _BAR_HEIGHT, _TICK = 14, 150, 4
 _PANEL = 128  # side of one of the figure's four pictures
 _DOT = 2.6
-_OPACITY = 0.82
+_OPACITY = 0.9
 
 Color = tuple[float, float, float, float]
 
@@ -85,10 +85,12 @@ def unregister() -> None:
 def legends() -> list[dict[str, Any]]:
     """The legends of our objects that this view shows."""
     space = bpy.context.space_data
-    shown = []
+    shown: list[dict[str, Any]] = []
     for object_ in _collection_objects():
         if LEGEND in object_ and object_.visible_get(viewport=space):
-            shown.append(json.loads(object_[LEGEND]))
+            legend = json.loads(object_[LEGEND])
+            if legend not in shown:  # points and painted surface share theirs
+                shown.append(legend)
     return shown
 
 
@@ -147,7 +149,7 @@ def _corner(ink: _Ink) -> tuple[float, float]:
             continue
         if region.type == "TOOLS" and region.alignment == "LEFT":
             left = max(left, region.x + region.width - window.x)
-        elif region.alignment == "BOTTOM" and region.y <= window.y + 1:
+        elif region.type == "HUD" or (region.alignment == "BOTTOM" and region.y <= window.y + 1):
             bottom = max(bottom, region.y + region.height - window.y)
     return left + ink.px(_MARGIN), bottom + ink.px(_MARGIN)
 

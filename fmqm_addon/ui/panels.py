@@ -8,6 +8,7 @@ from typing import ClassVar
 import bpy
 from bl_ui.utils import PresetPanel
 
+from ..blender.space import PLACE_LABELS
 from ..metric.score import COLUMNS
 from ..report.pair import SHOWN
 from . import session
@@ -17,6 +18,7 @@ from .scene import FMQMScene
 
 _WIDE = 330  # pixels at scale 1: from here on the rows have room for the four features
 _CHARACTER = 6.6  # pixels at scale 1, of the panel's font, about
+_SHORT_SPACE = {PLACE_LABELS["location"]: "Origins Aligned"}
 NOT_SEEN = "Normal maps, roughness and lighting are not part of FMQM"
 
 
@@ -165,7 +167,7 @@ class FMQM_PT_main(_Sidebar, bpy.types.Panel):  # noqa: N801
         row = layout.row()
         row.scale_y = 1.5
         row.operator_context = "INVOKE_DEFAULT"
-        row.operator("fmqm.measure", icon="VIEW_ORTHO")
+        row.operator("fmqm.measure", icon="DRIVER_DISTANCE")
         reason = why_not(fmqm)
         if reason:
             wrapped(layout, context, reason, icon="INFO")
@@ -285,11 +287,11 @@ def _draw_row(layout: bpy.types.UILayout, context: bpy.types.Context, fmqm: FMQM
     for label, text in (
         ("Against", reference),
         ("Triangles", f"{row.triangles:,} ({row.share:.3g} %)"),
-        ("Space", row.space.capitalize()),
+        ("Space", _SHORT_SPACE.get(row.space, row.space.capitalize())),
         ("Time", f"{row.seconds:.2f} s"),
     ):
         split = column.split(factor=0.5, align=True)
-        split.label(text=f"  {label}")
+        split.label(text=f"    {label}")
         split.label(text=text, translate=False)
     if row.warnings:
         box = layout.box().column()

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..blender import pointcloud, viewport
 from ..metric.errors import FMQMError
+from ..metric.fields import Fields
 from ..metric.score import Result
 from ..metric.spatial import Floats, Ints, cross
 from ..report import layers, probe
@@ -23,12 +24,15 @@ if TYPE_CHECKING:
     from .look import FMQMLook
 
 WORST_COUNT = 20
-POINT = 0.55  # usual radius of a point, in mean distances between neighbors
+POINT = 1.1  # usual radius of a point, in mean distances between neighbors
 LIFT = 0.002  # the painted copy lies this much above the surface, in diagonals, so as not to flicker
 SLICE_SIZE = 1.2  # in the longest side of the reference's box
 OUTLINE = 0.05  # encoded grey of the surface's cut in a slice
 FIGURE_SIDE = 48  # pixels of one picture of the figure of units
 AGAIN = "the samples are not in memory any longer; press Measure Quality again"
+
+choosing = False  # the index of the worst places is being set from here
+_painted_fields: dict[str, tuple[Fields, Fields]] = {}
 
 _UID = "fmqm_uid"  # custom properties of our objects: the row, the layer's patch, the usual point size
 _SPACING = "fmqm_spacing"
@@ -184,27 +188,49 @@ def paint_surface(scene: bpy.types.Scene) -> None:
         FMQMError: nothing to show.
     """
     uid, _, measured = measured_row(scene)
-    look = look_of(scene)
-    result = measured.comparison.result
-    length = world_length(measured)
-    distorted = measured.comparison.distorted
-    values, vertices = probe.surface_values(result, look.layer, measured.reference, distorted, length)
-    triangles = result.patch_mesh.triangles
-    ends = layers.value_range(look.layer, values, look.range == "FITTED", length)
+    mesh = measured.comparison.result.patch_mesh
     painted = pointcloud.build_surface(
         scene,
         pointcloud.PAINTED,
         "FMQM Painted",
-        vertices + LIFT * _vertex_normals(vertices, triangles),
-        triangles,
-        cloud_matrix(measured, look.place),
+        mesh.vertices + LIFT * _vertex_normals(mesh.vertices, mesh.triangles),
+        mesh.triangles,
+        cloud_matrix(measured, look_of(scene).place),
     )
     painted[_UID] = uid
-    pointcloud.recolor(painted, layers.layer_colors(look.layer, values, *ends))
-    _explain(scene, painted, look.layer, ends, result, distorted.name, "painted")
+    recolor_painted(scene)
     _appear(painted)
     viewport.show_colors()
+
+
+def recolor_painted(scene: bpy.types.Scene) -> None:
+    """Gives the painted copy, if there is one, the colors and the legend of the chosen layer."""
+    painted = pointcloud.find_object(pointcloud.PAINTED)
+    measured = None if painted is None else session.get(painted.get(_UID, ""))
+    if painted is None or measured is None:
+        return
+    look = look_of(scene)
+    result, distorted = measured.comparison.result, measured.comparison.distorted
+    length = world_length(measured)
+    if layers.LAYERS[look.layer].per_patch:
+        values = probe.blended_scores(result, look.layer)
+    else:
+        values = layers.field_values(look.layer, *_fields_of_vertices(painted[_UID], measured), length)
+    fitted_to = layers.layer_values(result, look.layer) if layers.LAYERS[look.layer].per_patch else values
+    ends = layers.value_range(look.layer, fitted_to, look.range == "FITTED", length)
+    pointcloud.recolor(painted, layers.layer_colors(look.layer, values, *ends))
+    _explain(scene, painted, look.layer, ends, result, distorted.name)
     viewport.redraw()
+
+
+def _fields_of_vertices(uid: str, measured: session.Measured) -> tuple[Fields, Fields]:
+    """The fields of both surfaces at the painted copy's vertices; of the last row only, since they are large."""
+    if uid not in _painted_fields:
+        _painted_fields.clear()
+        vertices = measured.comparison.result.patch_mesh.vertices
+        surfaces = (measured.reference, measured.comparison.distorted)
+        _painted_fields[uid] = (probe.fields_at(surfaces[0], vertices), probe.fields_at(surfaces[1], vertices))
+    return _painted_fields[uid]
 
 
 def _vertex_normals(vertices: Floats, triangles: Ints) -> Floats:
@@ -261,6 +287,16 @@ def show_all_patches(scene: bpy.types.Scene) -> None:
         pointcloud.resize(cloud, look.point_size * POINT * cloud.get(_SPACING, 0.0), shown)
 
 
+def choose_worst(look: FMQMLook, index: int) -> None:
+    """Sets the index of the list without framing the view, which a click in the list does."""
+    global choosing
+    choosing = True
+    try:
+        look.worst_index = index
+    finally:
+        choosing = False
+
+
 def _fill_worst(look: FMQMLook, result: Result, uid: str) -> None:
     look.focused = False
     if look.worst_uid == uid and len(look.worst):
@@ -271,8 +307,8 @@ def _fill_worst(look: FMQMLook, result: Result, uid: str) -> None:
         item.name = f"Patch {worst.patch}"
         item.patch, item.score, item.value = worst.patch, worst.score, worst.value
         item.blame = f"{layers.LAYERS[worst.blame].label} {worst.value:.2f}"
-    look.worst_index = 0
     look.worst_uid = uid
+    choose_worst(look, 0)
 
 
 # --- Shells, units, slices
@@ -416,14 +452,21 @@ def show_unit(scene: bpy.types.Scene, sample: int) -> None:
 
 
 def step_unit(scene: bpy.types.Scene, step: int) -> None:
-    """The figure of the sample so many of the metric's color units after the last one.
+    """The figure of the sample so many of the metric's color units after the last one; in the patch that is
+    shown alone, if one is.
 
     Raises:
         FMQMError: nothing to show.
     """
     _, _, measured = measured_row(scene)
-    units = np.flatnonzero(measured.comparison.result.samples.unit)
-    place = int(np.searchsorted(units, look_of(scene).unit_sample))
+    samples, look = measured.comparison.result.samples, look_of(scene)
+    wanted = samples.unit
+    if look.focused and look.worst_index < len(look.worst):
+        wanted = wanted & (samples.patch == look.worst[look.worst_index].patch)
+    units = np.flatnonzero(wanted)
+    place = int(np.searchsorted(units, look.unit_sample))
+    if overlay.figure is None or place == len(units) or units[place] != look.unit_sample:
+        step = min(step, 0)  # nothing of these is shown yet: the next one is the one at this place
     show_unit(scene, int(units[(place + step) % len(units)]))
 
 
@@ -456,6 +499,7 @@ def nearest_sample(
 def clear() -> int:
     """Removes all of it from the file and gives the views their settings back; how many data-blocks there were."""
     overlay.figure = None
+    _painted_fields.clear()
     count = pointcloud.clear()
     viewport.restore_colors()
     viewport.redraw()

@@ -50,11 +50,12 @@ def check(scene: bpy.types.Scene) -> None:
 
 
 def redraw() -> None:
-    """The sidebars of all windows."""
+    """The sidebars of all windows, and only these: the scene beside them may take long to draw."""
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()
+            for region in area.regions if area.type == "VIEW_3D" else ():
+                if region.type == "UI":
+                    region.tag_redraw()
 
 
 def _check_all() -> None:
