@@ -10,7 +10,7 @@ VENV = .venv/$(VERSION)
 RUN = $(VENV)/bin/python
 
 # Blender's own tool for extensions, which needs no Blender.
-EXTENSION_TOOL = $(RUN) $(wildcard $(VENV)/lib/python*/site-packages/bpy/*/scripts/addons_core/bl_pkg/cli/blender_ext.py)
+EXTENSION_TOOL = $(RUN) $(VENV)/lib/python*/site-packages/bpy/*/scripts/addons_core/bl_pkg/cli/blender_ext.py
 
 .PHONY: demo extension test test-all bench lint clean
 

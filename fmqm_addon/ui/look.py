@@ -32,7 +32,7 @@ _FIELD_ITEMS = [item for item in _LAYER_ITEMS if not layers.LAYERS[item[0]].per_
 
 
 def _recolor(look: FMQMLook, _: bpy.types.Context) -> None:
-    show.recolor_cloud(look.id_data)
+    show.update_cloud(look.id_data)
     show.recolor_painted(look.id_data)
 
 
@@ -487,8 +487,7 @@ CLASSES: tuple[type, ...] = (
 
 def row_chosen(scene: bpy.types.Scene) -> None:
     """For the results list: the cloud, if one is shown, becomes that of the row just chosen or measured."""
-    if pointcloud.find_object(pointcloud.CLOUD) is not None:
-        _quietly(lambda: show.show_cloud(scene))
+    show.update_cloud(scene)
 
 
 def _watch_slice() -> None:

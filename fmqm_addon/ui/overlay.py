@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from ..blender import pointcloud
 from ..metric.spatial import Floats
+from . import session
 
 LEGEND = "fmqm_legend"  # custom property of the objects that have a legend: report.layers.Legend as JSON
 _FONT = 0
@@ -52,11 +53,13 @@ class UnitFigure:
 
     Attributes:
         title: which sample. pictures: normal reference, normal compared, tangent reference, tangent compared.
-        scene: the name of the scene it belongs to. lines: (m, 2, 3) the mark in the world.
+        uid: the row it was made from. scene: the name of the scene it belongs to.
+        lines: (m, 2, 3) the mark in the world.
     """
 
     title: str
     pictures: tuple[UnitPicture, UnitPicture, UnitPicture, UnitPicture]
+    uid: str
     scene: str
     lines: Floats
     batches: list[Any] = field(default_factory=list)  # made when first drawn: only there is a GPU context
@@ -109,8 +112,13 @@ def _draw_legends() -> None:
     x, y = _corner(ink)
     for legend in legends():
         x += _draw_legend(ink, legend, x, y) + ink.px(_GAP)
-    if figure is not None and figure.scene == bpy.context.scene.name:
+    if figure is not None and _belongs_here(figure):
         _draw_figure(ink, figure, x, y)
+
+
+def _belongs_here(shown: UnitFigure) -> bool:
+    """Its row is still there, in this file and scene."""
+    return shown.scene == bpy.context.scene.name and session.get(shown.uid) is not None
 
 
 class _Ink:
@@ -257,7 +265,7 @@ def _picture_batch(picture: UnitPicture) -> Any:
 
 def _draw_marks() -> None:
     """The chosen sample, its way to the surface and the rim of its tangent unit, seen through everything."""
-    if figure is None or figure.scene != bpy.context.scene.name or not bpy.context.space_data.overlay.show_overlays:
+    if figure is None or not _belongs_here(figure) or not bpy.context.space_data.overlay.show_overlays:
         return
     points = figure.lines.reshape(-1, 3).astype(np.float32)
     shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")

@@ -90,14 +90,12 @@ def show_cloud(scene: bpy.types.Scene) -> bpy.types.Object:
     return cloud
 
 
-def recolor_cloud(scene: bpy.types.Scene) -> bool:
-    """Gives the cloud, if there is one, the colors and the legend of the chosen layer; False: its samples are gone."""
+def recolor_cloud(scene: bpy.types.Scene) -> None:
+    """Gives the cloud the colors and the legend of the chosen layer, unless its samples are gone."""
     cloud = pointcloud.find_object(pointcloud.CLOUD)
-    if cloud is None:
-        return True
-    measured = session.get(cloud.get(_UID, ""))
-    if measured is None:
-        return False
+    measured = None if cloud is None else session.get(cloud.get(_UID, ""))
+    if cloud is None or measured is None:
+        return
     look = look_of(scene)
     result = measured.comparison.result
     length = world_length(measured)
@@ -105,7 +103,19 @@ def recolor_cloud(scene: bpy.types.Scene) -> bool:
     pointcloud.recolor(cloud, colors)
     _explain(scene, cloud, look.layer, ends, result, measured.comparison.distorted.name)
     viewport.redraw()
-    return True
+
+
+def update_cloud(scene: bpy.types.Scene) -> None:
+    """Brings the cloud, if there is one, up to date: with the chosen layer, and the chosen row."""
+    cloud = pointcloud.find_object(pointcloud.CLOUD)
+    if cloud is None:
+        return
+    rows, index = scene.fmqm.rows, scene.fmqm.row_index
+    chosen = rows[index].uid if 0 <= index < len(rows) else ""
+    if chosen != cloud.get(_UID) and session.get(chosen) is not None:
+        show_cloud(scene)
+    else:
+        recolor_cloud(scene)
 
 
 def resize_cloud(scene: bpy.types.Scene) -> None:
@@ -429,7 +439,7 @@ def show_unit(scene: bpy.types.Scene, sample: int) -> None:
     Raises:
         FMQMError: nothing to show.
     """
-    _, name, measured = measured_row(scene)
+    uid, name, measured = measured_row(scene)
     result = measured.comparison.result
     sample %= len(result.samples.positions)
     unit = probe.unit_of(result, sample)
@@ -446,7 +456,7 @@ def show_unit(scene: bpy.types.Scene, sample: int) -> None:
     matrix = cloud_matrix(measured, look.place)
     lines = probe.unit_lines(result, unit) @ matrix[:3, :3].T + matrix[:3, 3]
     title = f"Sample {sample} of {name}"
-    overlay.figure = overlay.UnitFigure(title, tuple(pictures), scene.name, lines)  # type: ignore[arg-type]
+    overlay.figure = overlay.UnitFigure(title, tuple(pictures), uid, scene.name, lines)  # type: ignore[arg-type]
     look.unit_sample = sample
     viewport.redraw()
 

@@ -133,7 +133,7 @@ def unregister() -> None:
         handlers = getattr(bpy.app.handlers, name)
         if handler in handlers:
             handlers.remove(handler)
+    _stop_job()  # which asks for a check
     if bpy.app.timers.is_registered(_check_all):
         bpy.app.timers.unregister(_check_all)
-    _stop_job()
     session.clear()

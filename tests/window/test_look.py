@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reads pictures of the program's window: is what the add-on shows really on the screen, without any switch?
+
+FMQM_SCREENSHOT names a command `... SCRIPT OUT_PREFIX` that opens Blender's window, runs the script with
+shot(name) and done() in builtins, and saves OUT_PREFIX-name.png.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.program
+ROOT = Path(__file__).resolve().parents[2]
+Pixels = np.ndarray
+
+
+@pytest.fixture(scope="module")
+def pictures(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Pixels]:
+    """(H, W, 3) float pictures in [0, 1] of the 3D view and, under "panel", of its sidebar."""
+    command = os.environ.get("FMQM_SCREENSHOT")
+    if not command:
+        pytest.skip("FMQM_SCREENSHOT does not name a command that takes pictures of Blender's window")
+    image = pytest.importorskip("PIL.Image")
+    out = tmp_path_factory.mktemp("pictures")
+    done = subprocess.run(
+        [*shlex.split(command), str(Path(__file__).with_name("look_script.py")), str(out / "view")],
+        env={**os.environ, "FMQM_ROOT": str(ROOT), "FMQM_OUT": str(out)},
+        capture_output=True,
+        text=True,
+        timeout=400,
+        check=False,
+    )
+    error = out / "error.txt"
+    assert not error.exists(), error.read_text()
+    assert "Traceback" not in done.stdout + done.stderr, done.stdout + done.stderr
+    regions = json.loads((out / "regions.json").read_text())
+    print(f"pictures are in {out}")
+    found = {}
+    for path in sorted(out.glob("view-*.png")):
+        whole = np.asarray(image.open(path).convert("RGB"), np.float64) / 255
+        found[path.stem.removeprefix("view-")] = cut(whole, regions["WINDOW"], regions["UI"][2])
+        found["panel"] = cut(whole, regions["UI"])
+    return found
+
+
+def cut(picture: Pixels, region: list[int], less: int = 0) -> Pixels:
+    """A region of the window, whose rows count from below."""
+    x, y, width, height = region
+    return picture[picture.shape[0] - y - height : picture.shape[0] - y, x : x + width - less]
+
+
+def center(picture: Pixels) -> Pixels:
+    """Without the toolbar, the legend and what lies along the edges."""
+    height, width, _ = picture.shape
+    return picture[int(0.12 * height) : int(0.9 * height), int(0.25 * width) :]
+
+
+def count(picture: Pixels, color: tuple[float, float, float], tolerance: float = 0.12) -> int:
+    """Pixels of about the same chromaticity as a color; shade takes all channels down alike."""
+    bright = picture.max(axis=2) > 0.25
+    scaled = picture / np.maximum(picture.max(axis=2, keepdims=True), 1e-6)
+    wanted = np.array(color) / max(color)
+    return int((bright & (np.abs(scaled - wanted).max(axis=2) < tolerance)).sum())
+
+
+def saturated(picture: Pixels) -> int:
+    return int((picture.max(axis=2) - picture.min(axis=2) > 0.25).sum())
+
+
+def test_points_show_in_solid_shading(pictures: dict[str, Pixels]) -> None:
+    from fmqm_addon.report.colormap import score_colors
+
+    before, shown = center(pictures["before"]), center(pictures["look"])
+    assert saturated(shown) > saturated(before) + 5_000
+    hot, dark = score_colors(np.array([0.12, 0.75]))
+    for color in (hot, dark):
+        assert count(shown, tuple(color)) > count(before, tuple(color)) + 100, color
+
+
+def test_legend_shows(pictures: dict[str, Pixels]) -> None:
+    height, width, _ = pictures["look"].shape
+    corner = (slice(int(0.6 * height), height), slice(0, int(0.2 * width)))
+    assert saturated(pictures["look"][corner]) > saturated(pictures["before"][corner]) + 500
+
+
+def test_another_layer_looks_different(pictures: dict[str, Pixels]) -> None:
+    changed = np.abs(center(pictures["look"]) - center(pictures["layer"])).max(axis=2) > 0.1
+    assert changed.mean() > 0.03
+
+
+def test_worst_place_is_framed_alone(pictures: dict[str, Pixels]) -> None:
+    changed = np.abs(center(pictures["layer"]) - center(pictures["worst"])).max(axis=2) > 0.1
+    assert changed.mean() > 0.1
+
+
+def test_clear_leaves_nothing(pictures: dict[str, Pixels]) -> None:
+    assert saturated(center(pictures["cleared"])) < 300 + saturated(center(pictures["before"]))
+    height, width, _ = pictures["cleared"].shape
+    corner = (slice(int(0.6 * height), height), slice(int(0.05 * width), int(0.2 * width)))
+    assert saturated(pictures["cleared"][corner]) < 200
+
+
+def test_panel_is_not_empty(pictures: dict[str, Pixels]) -> None:
+    lines = np.abs(np.diff(pictures["panel"].mean(axis=2), axis=1)) > 0.1
+    assert lines.any(axis=1).mean() > 0.3  # rows with text or edges
