@@ -84,7 +84,7 @@ class FMQM_UL_rows(bpy.types.UIList):  # noqa: N801
         _active_data: FMQMScene,
         _active_property: str,
     ) -> None:
-        icon = "NONE"
+        icon = "BLANK1"  # names stay in line
         if row.error:
             icon = "CANCEL"
         elif row.uid in session.stale:
