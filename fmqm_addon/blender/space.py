@@ -218,5 +218,5 @@ def _warnings(
     scale = np.linalg.norm(chosen.box[1] - chosen.box[0]) / np.linalg.norm(target[1] - target[0])
     return (
         f"{name}: its box and the reference's differ by {100 * chosen.misfit:.0f} % of the diagonal (size "
-        f"{100 * scale:.0f} %), as if they were placed differently; the score tells of that too",
+        f"{100 * scale:.0f} %), as if they were placed differently; that lowers the score",
     )

@@ -87,9 +87,15 @@ def split_edges(vertices: Floats, triangles: Ints, large: NDArray[np.bool_]) -> 
     Returns:
         The new vertices and triangles, and for each new triangle the row of the one it was cut from, or was.
     """
-    first, second = triangles, np.roll(triangles, -1, axis=1)  # edge k joins corners k and k + 1
+    touched = np.zeros(len(vertices), bool)
+    touched[triangles[large]] = True
+    a, b, c = touched[triangles].T
+    near = (a & b) | (b & c) | (c & a)  # the others have no edge that could be halved
+    rest, near = np.flatnonzero(~near), np.flatnonzero(near)
+
+    first, second = triangles[near], np.roll(triangles[near], -1, axis=1)  # edge k joins corners k and k + 1
     keys = np.minimum(first, second) * len(vertices) + np.maximum(first, second)
-    split_keys = np.unique(keys[large])
+    split_keys = np.unique(keys[large[near]])
     place = np.searchsorted(split_keys, keys).clip(max=len(split_keys) - 1)
     halved = split_keys[place] == keys
     middle = len(vertices) + place
@@ -97,7 +103,7 @@ def split_edges(vertices: Floats, triangles: Ints, large: NDArray[np.bool_]) -> 
     vertices = np.concatenate([vertices, vertices[ends].mean(axis=1)])
 
     count = halved.sum(axis=1)
-    whole = np.flatnonzero(count == 0)
+    whole = np.concatenate([rest, near[count == 0]])
     pieces, cut_from = [triangles[whole]], [whole]
     for n in (1, 2, 3):
         rows = np.flatnonzero(count == n)
@@ -109,7 +115,7 @@ def split_edges(vertices: Floats, triangles: Ints, large: NDArray[np.bool_]) -> 
         else:
             turn = (halved[rows].argmin(axis=1) + 1) % 3
         corners = (turn[:, None] + np.arange(3)) % 3
-        a, b, c = triangles[rows[:, None], corners].T
+        a, b, c = first[rows[:, None], corners].T
         ab, bc, ca = middle[rows[:, None], corners].T
         if n == 1:
             parts = [(a, ab, c), (ab, b, c)]
@@ -118,21 +124,22 @@ def split_edges(vertices: Floats, triangles: Ints, large: NDArray[np.bool_]) -> 
         else:
             parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
         pieces += [np.stack(part, axis=1) for part in parts]
-        cut_from += [rows] * len(parts)
+        cut_from += [near[rows]] * len(parts)
     return vertices, np.concatenate(pieces), np.concatenate(cut_from)
 
 
-def choose_centers(vertices: Floats, settings: Settings) -> Ints:
-    """(P,) vertex indices of the scored patches' centres, in their order; every vertex if there are fewer."""
+def choose_centers(vertices: Floats, settings: Settings) -> Iterator[int]:
+    """The vertices that are the scored patches' centres, in their order; every vertex if there are fewer."""
     count = min(settings.patches, len(vertices))
     scored = count if settings.scored_patches is None else min(settings.scored_patches, count)
     if settings.centers == "random":
         rng = np.random.default_rng(np.random.SeedSequence(settings.seed, spawn_key=(0,)))
-        return rng.choice(len(vertices), count, replace=False)[:scored]
-    return farthest_points(vertices, scored)
+        yield from rng.choice(len(vertices), count, replace=False)[:scored].tolist()
+    else:
+        yield from farthest_points(vertices, scored)
 
 
-def farthest_points(vertices: Floats, count: int) -> Ints:
+def farthest_points(vertices: Floats, count: int) -> Iterator[int]:
     """Farthest point sampling (V-B), deterministic: starts at the vertex farthest from the mean.
 
     Vertices lie in blocks along a space-filling curve; a new centre touches only blocks whose box it
@@ -150,18 +157,19 @@ def farthest_points(vertices: Floats, count: int) -> Ints:
         return int(order[blocks][squared[blocks] >= tie].min())
 
     from_mean = ((points - vertices.mean(axis=0)) ** 2).sum(axis=2)
-    centers = [farthest(from_mean, from_mean.max(axis=1))]
+    latest = farthest(from_mean, from_mean.max(axis=1))
+    yield latest
     squared = np.full(order.shape, np.inf)
     block_max = np.full(len(order), np.inf)
-    while len(centers) < count:
-        center = vertices[centers[-1]]
+    for _ in range(count - 1):
+        center = vertices[latest]
         gap = np.maximum(np.maximum(low - center, center - high), 0)
         touched = np.flatnonzero((gap * gap).sum(axis=1) < block_max)
         offset = points[touched] - center
         squared[touched] = np.minimum(squared[touched], np.einsum("bpc,bpc->bp", offset, offset))
         block_max[touched] = squared[touched].max(axis=1)
-        centers.append(farthest(squared, block_max))
-    return np.array(centers)
+        latest = farthest(squared, block_max)
+        yield latest
 
 
 def grow_patches(mesh: PatchMesh, centers: Ints, n_patches: int) -> Iterator[Patch]:

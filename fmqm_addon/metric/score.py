@@ -146,8 +146,11 @@ class Evaluation:
         settings = self.settings
         mesh = yield from as_work(build_patch_mesh(self.reference, settings.patches), "prepare", 0.0, 0.05)
         yield Progress("prepare", 0.05)
-        centers = choose_centers(mesh.vertices, settings)
-        yield Progress("prepare", 0.1)
+        chosen = []
+        for center in choose_centers(mesh.vertices, settings):
+            chosen.append(center)
+            yield Progress("prepare", 0.05 + 0.05 * len(chosen) / settings.patches)
+        centers = np.array(chosen)
         patches, parts = [], []
         total_area = mesh.area
         for patch in grow_patches(mesh, centers, settings.patches):

@@ -6,12 +6,16 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, IntProperty, PointerProperty
 
-from .look import FMQMLook
+from .look import FMQMLook, row_chosen
 from .properties import FMQMItem, FMQMRow, FMQMSettings, is_asset
 
 
 def _can_be_picked(_: FMQMScene, object_: bpy.types.Object) -> bool:
     return is_asset(object_)
+
+
+def _row_chosen(self: FMQMScene, _: bpy.types.Context) -> None:
+    row_chosen(self.id_data)
 
 
 class FMQMScene(bpy.types.PropertyGroup):
@@ -46,7 +50,9 @@ class FMQMScene(bpy.types.PropertyGroup):
     compared_index: IntProperty(name="Active Compared", description="Chosen row of the list", default=0, min=0)
     settings: PointerProperty(name="Settings", description="How it is measured", type=FMQMSettings)
     rows: CollectionProperty(name="Results", description="One row per compared object", type=FMQMRow)
-    row_index: IntProperty(name="Active Result", description="Chosen row of the results", default=0, min=0)
+    row_index: IntProperty(
+        name="Active Result", description="Chosen row of the results", default=0, min=0, update=_row_chosen
+    )
     look: PointerProperty(name="Look", description="What of the chosen result is shown", type=FMQMLook)
 
 

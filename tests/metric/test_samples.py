@@ -23,7 +23,7 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 def patches_of(mesh: PatchMesh, settings: Settings) -> list[Patch]:
-    return list(grow_patches(mesh, choose_centers(mesh.vertices, settings), settings.patches))
+    return list(grow_patches(mesh, np.array(list(choose_centers(mesh.vertices, settings))), settings.patches))
 
 
 def some_patch(area: float) -> Patch:
@@ -148,7 +148,7 @@ def test_sigma_scales_the_offsets_and_nothing_else() -> None:
 def test_a_patchs_samples_depend_on_seed_and_center_alone() -> None:
     """Neither on the other patches nor on their order."""
     mesh = finish(build_patch_mesh(surface(cube(3)), 10))
-    centers = choose_centers(mesh.vertices, SMALL)
+    centers = np.array(list(choose_centers(mesh.vertices, SMALL)))
 
     def draw(order: Ints, settings: Settings = SMALL) -> dict[int, PatchSamples]:
         return {p.center: draw_samples(mesh, p, mesh.area, settings) for p in grow_patches(mesh, order, 10)}
@@ -209,7 +209,7 @@ def test_counts_are_the_same_far_from_the_origin() -> None:
     turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
     here = surface((positions @ turn.T, triangles))
     away = surface((positions @ turn.T + 1e5 * np.sqrt(2) * 100 * np.array([0.6, 0.64, 0.48]), triangles))
-    places = here.vertices[choose_centers(here.vertices, Settings(scored_patches=20))]
+    places = here.vertices[np.array(list(choose_centers(here.vertices, Settings(scored_patches=20))))]
     counts = []
     for shape in (here, away):
         mesh = finish(build_patch_mesh(shape, 250))
