@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tomllib
 import zipfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import bpy
@@ -38,7 +39,7 @@ def found():
 
 report = {"before": found()}
 bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-bpy.ops.extensions.package_install_files(filepath=sys.argv[1], repo="user_default", enable_on_install=True)
+bpy.ops.extensions.package_install_files(filepath=sys.argv[-1], repo="user_default", enable_on_install=True)
 module = "bl_ext.user_default.fmqm"
 report["enabled"] = module in bpy.context.preferences.addons
 report["installed"] = found()
@@ -126,11 +127,12 @@ def test_the_zip_of_a_code_host(package: Path, tmp_path: Path) -> None:
     live(hosted, tmp_path)
 
 
-def live(package: Path, folder: Path) -> None:
+def live(package: Path, folder: Path, command: Sequence[str] = (sys.executable,), before: Sequence[str] = ()) -> None:
+    """Runs LIFE by the command, with the package behind `before`, and checks what it reports."""
     script = folder / "life.py"
     script.write_text(LIFE)
     done = subprocess.run(
-        [sys.executable, str(script), str(package)],
+        [*command, str(script), *before, str(package)],
         capture_output=True,
         text=True,
         timeout=300,

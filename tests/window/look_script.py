@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Runs inside the program, started by test_look.py: measures two objects, looks at them, takes pictures.
 
-FMQM_ROOT is the checkout, FMQM_OUT a folder for what is not a picture. The command that FMQM_SCREENSHOT
+FMQM_ZIP is the built extension, FMQM_OUT a folder for what is not a picture. The command that FMQM_SCREENSHOT
 names gives shot(name) and done().
 """
 
@@ -14,15 +14,14 @@ import sys
 import traceback
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 
 import bpy
 import numpy as np
 
-sys.path.insert(0, os.environ["FMQM_ROOT"])
-import fmqm_addon
-
 DRAWN = 6  # seconds until a change is on the screen, drawn by software
 OUT = Path(os.environ["FMQM_OUT"])
+REPORT: dict[str, object] = {}
 
 
 def view() -> tuple[bpy.types.Window, bpy.types.Area]:
@@ -68,7 +67,9 @@ def build() -> None:
 
 
 def start() -> None:
-    fmqm_addon.register()
+    bpy.ops.extensions.package_install_files(
+        filepath=os.environ["FMQM_ZIP"], repo="user_default", enable_on_install=True
+    )
     build()
     _, area = view()
     area.spaces.active.show_region_ui = True
@@ -86,9 +87,31 @@ def measure() -> None:
     for region in area.regions:
         if region.type == "UI":
             region.active_panel_category = "FMQM"
-    bpy.ops.fmqm.measure()
+    REPORT["blocks"] = blocks()
+    bpy.ops.fmqm.measure("INVOKE_DEFAULT")
+    REPORT["modal"] = session().job is not None
     rectangles = {r.type: (r.x, r.y, r.width, r.height) for r in area.regions}
     (OUT / "regions.json").write_text(json.dumps(rectangles))
+
+
+def session() -> ModuleType:
+    """The installed add-on's module."""
+    return sys.modules["bl_ext.user_default.fmqm.fmqm_addon.ui.session"]
+
+
+def blocks() -> int:
+    """Data-blocks of the file; images and screens of the window itself do not count."""
+    kinds = ("objects", "meshes", "materials", "images", "collections", "node_groups")
+    return sum(len(getattr(bpy.data, kind)) for kind in kinds)
+
+
+def clear() -> None:
+    rows = bpy.context.scene.fmqm.rows
+    bpy.ops.fmqm.clear()
+    REPORT["blocks after"] = blocks()
+    REPORT["rows"] = [(row.name, row.scores, row.error) for row in rows]
+    REPORT["longest tick"] = session().longest_tick
+    (OUT / "report.json").write_text(json.dumps(REPORT))
 
 
 def look() -> None:
@@ -106,14 +129,16 @@ STEPS: list[tuple[Callable[[], object], str]] = [
     (look, "look"),
     (other_layer, "layer"),
     (lambda: bpy.ops.fmqm.worst_step(step=1), "worst"),
-    (lambda: bpy.ops.fmqm.clear(), "cleared"),
+    (clear, "cleared"),
 ]
 
 
-def step() -> None:
+def step() -> float | None:
+    if "modal" in REPORT and session().job is not None:
+        return 0.5  # the modal operator is still measuring; its own timer drives it
     if not STEPS:
         builtins.done()
-        return
+        return None
     act, name = STEPS.pop(0)
     window, area = view()
     region = next(region for region in area.regions if region.type == "WINDOW")
@@ -123,8 +148,9 @@ def step() -> None:
     except Exception:
         (OUT / "error.txt").write_text(traceback.format_exc())
         builtins.done()
-        return
+        return None
     bpy.app.timers.register(lambda: picture(name), first_interval=DRAWN)
+    return None
 
 
 def picture(name: str) -> None:

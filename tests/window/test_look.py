@@ -15,14 +15,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from blender.test_extension import package  # noqa: F401  the fixture
 
 pytestmark = pytest.mark.program
-ROOT = Path(__file__).resolve().parents[2]
 Pixels = np.ndarray
+REPORT: dict[str, object] = {}  # what the script wrote down
 
 
 @pytest.fixture(scope="module")
-def pictures(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Pixels]:
+def pictures(tmp_path_factory: pytest.TempPathFactory, package: Path) -> dict[str, Pixels]:  # noqa: F811
     """(H, W, 3) float pictures in [0, 1] of the 3D view and, under "panel", of its sidebar."""
     command = os.environ.get("FMQM_SCREENSHOT")
     if not command:
@@ -31,7 +32,7 @@ def pictures(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Pixels]:
     out = tmp_path_factory.mktemp("pictures")
     done = subprocess.run(
         [*shlex.split(command), str(Path(__file__).with_name("look_script.py")), str(out / "view")],
-        env={**os.environ, "FMQM_ROOT": str(ROOT), "FMQM_OUT": str(out)},
+        env={**os.environ, "FMQM_ZIP": str(package), "FMQM_OUT": str(out)},
         capture_output=True,
         text=True,
         timeout=400,
@@ -42,6 +43,7 @@ def pictures(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Pixels]:
     assert "Traceback" not in done.stdout + done.stderr, done.stdout + done.stderr
     regions = json.loads((out / "regions.json").read_text())
     print(f"pictures are in {out}")
+    REPORT.update(json.loads((out / "report.json").read_text()))
     found = {}
     for path in sorted(out.glob("view-*.png")):
         whole = np.asarray(image.open(path).convert("RGB"), np.float64) / 255
@@ -110,3 +112,13 @@ def test_clear_leaves_nothing(pictures: dict[str, Pixels]) -> None:
 def test_panel_is_not_empty(pictures: dict[str, Pixels]) -> None:
     lines = np.abs(np.diff(pictures["panel"].mean(axis=2), axis=1)) > 0.1
     assert lines.any(axis=1).mean() > 0.3  # rows with text or edges
+
+
+def test_measured_by_the_modal_operator(pictures: dict[str, Pixels]) -> None:
+    """From the installed zip; what Clear leaves is what there was before."""
+    assert REPORT["modal"] is True
+    (row,) = REPORT["rows"]  # type: ignore[misc]
+    name, scores, error = row
+    assert (name, error) == ("Monkey_LOD1", "") and 0 < json.loads(scores)[-1] < 1
+    assert REPORT["blocks after"] == REPORT["blocks"]
+    print(f"longest tick {REPORT['longest tick']:.3f} s")
