@@ -5,17 +5,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..metric.color import Color, Texture
+from ..metric.color import Material, Texture
 from ..metric.errors import MeshError
 from ..metric.spatial import Floats
-from ..metric.surface import MeshArrays
+from ..metric.surface import MeshArrays, join_meshes
 from .material import SlotColor, TextureCache, slot_color
 
 
@@ -42,7 +41,7 @@ def mesh_arrays(
     if not parts:
         what = "the mesh has no faces" if objects else "no mesh in it"
         raise MeshError(f"{name}: {what}; a surface is wanted")
-    return _join(parts, name)
+    return join_meshes(parts, name)
 
 
 @contextmanager
@@ -86,18 +85,6 @@ def evaluated(
         bpy.data.scenes.remove(scene)
 
 
-@dataclass(frozen=True)
-class _Part:
-    """One object: the fields of MeshArrays, with colors of its own."""
-
-    positions: Floats
-    triangles: NDArray[np.int32]
-    uv: NDArray[np.float32]
-    material: NDArray[np.int32]
-    colors: list[Color]
-    warnings: list[str]
-
-
 def _object_arrays(
     object_: bpy.types.Object,
     depsgraph: bpy.types.Depsgraph,
@@ -105,7 +92,7 @@ def _object_arrays(
     texture: Texture | None,
     cache: TextureCache,
     frame: Floats | None,
-) -> _Part | None:
+) -> MeshArrays | None:
     """Arrays of one evaluated object; None if it has no faces. The name is the original's, for messages."""
     mesh = object_.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph)
     try:
@@ -129,13 +116,14 @@ def _object_arrays(
             if look.uv_map is not None:
                 here = material == index
                 uv[here] = _uv_map(mesh, look.uv_map, name)[loops[here]]
-        return _Part(
+        return MeshArrays(
+            name=name,
             positions=local.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3],
             triangles=triangles,
-            uv=uv,
-            material=material.astype(np.int32),
-            colors=[look.color for look in looks],
-            warnings=[warning for look in looks for warning in look.warnings],
+            corners=uv,
+            material=material,
+            materials=tuple(Material(name, look.color) for look in looks),
+            warnings=tuple(warning for look in looks for warning in look.warnings),
         )
     finally:
         object_.to_mesh_clear()
@@ -176,17 +164,3 @@ def _read(
     values: NDArray[Any] = np.empty(shape, dtype)
     collection.foreach_get(attribute, values.reshape(-1))
     return values
-
-
-def _join(parts: list[_Part], name: str) -> MeshArrays:
-    vertex_start = np.cumsum([0] + [len(part.positions) for part in parts[:-1]])
-    color_start = np.cumsum([0] + [len(part.colors) for part in parts[:-1]])
-    return MeshArrays(
-        name=name,
-        positions=np.concatenate([part.positions for part in parts]),
-        triangles=np.concatenate([part.triangles + start for part, start in zip(parts, vertex_start, strict=True)]),
-        uv=np.concatenate([part.uv for part in parts]),
-        material=np.concatenate([part.material + start for part, start in zip(parts, color_start, strict=True)]),
-        colors=tuple(color for part in parts for color in part.colors),
-        warnings=tuple(dict.fromkeys(warning for part in parts for warning in part.warnings)),
-    )

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..metric.color import Texture
 from ..metric.errors import MeshError
 from ..metric.spatial import Floats
-from ..metric.surface import MeshArrays
+from ..metric.surface import MeshArrays, join_meshes
 from .mesh import evaluated, mesh_arrays
 from .space import Placed, moved
 
@@ -117,21 +117,7 @@ def _arrays(
         inner = _arrays(_members(collection.all_objects), name, texture, offset, depth + 1)
         matrix = _matrix_of(instancer)
         parts.append(moved(inner, np.eye(4) if np.array_equal(matrix, frame) else np.linalg.inv(frame) @ matrix))
-    return parts[0] if len(parts) == 1 else _join(parts, name)
-
-
-def _join(parts: Sequence[MeshArrays], name: str) -> MeshArrays:
-    vertex_start = np.cumsum([0] + [len(part.positions) for part in parts[:-1]])
-    color_start = np.cumsum([0] + [len(part.colors) for part in parts[:-1]])
-    return MeshArrays(
-        name=name,
-        positions=np.concatenate([part.positions for part in parts]),
-        triangles=np.concatenate([part.triangles + start for part, start in zip(parts, vertex_start, strict=True)]),
-        uv=np.concatenate([part.uv for part in parts]),
-        material=np.concatenate([part.material + start for part, start in zip(parts, color_start, strict=True)]),
-        colors=tuple(color for part in parts for color in part.colors),
-        warnings=tuple(dict.fromkeys(warning for part in parts for warning in part.warnings)),
-    )
+    return join_meshes(parts, name)
 
 
 def _without_modifiers(object_: bpy.types.Object, label: str) -> Placed:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,15 +22,42 @@ _RGB_TO_XYZ = np.array(  # IEC 61966-2-1
 )
 
 
+class Color(Protocol):
+    """What color a material has at a place, from the corner values there (MeshArrays.corners)."""
+
+    def lookup(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(N, 3) float64 colors in [0, 1], encoded for display (sRGB), for (N, K) interpolated values."""
+
+
+class Alpha(Protocol):
+    """How opaque a material is at a place."""
+
+    def opacity(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(N,) float64 in [0, 1] for (N, K) interpolated values."""
+
+
+@dataclass(frozen=True)
+class Material:
+    """What triangles look like.
+
+    Attributes:
+        name: for messages and reports.
+        color, alpha: at a place; None is opaque everywhere.
+    """
+
+    name: str
+    color: Color
+    alpha: Alpha | None = None
+
+
 @dataclass(frozen=True)
 class PlainColor:
     """One color everywhere: rgb as encoded for display (sRGB), in [0, 1]."""
 
     rgb: tuple[float, float, float]
 
-    def lookup(self, uv: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(N, 3) colors for N (u, v)."""
-        return np.broadcast_to(np.asarray(self.rgb, np.float64), (len(uv), 3))
+    def lookup(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.broadcast_to(np.asarray(self.rgb, np.float64), (len(values), 3))
 
 
 @dataclass(frozen=True)
@@ -92,9 +119,6 @@ class Texture:
 
 def _at(pixels: NDArray[Any], index: NDArray[np.int64]) -> NDArray[Any]:
     return pixels.take(index, axis=0)
-
-
-Color = PlainColor | Texture
 
 
 def encode_srgb(linear: NDArray[Any]) -> NDArray[np.float64]:

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A mesh as the metric sees it: welded triangles in one frame, corner UVs, colors, and its spatial query."""
+"""A mesh as the metric sees it: welded triangles in one frame, what their colors are, and its spatial query."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
-from dataclasses import dataclass
+from collections.abc import Callable, Generator, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .color import Color
+from .color import Material
 from .errors import MeshError
 from .spatial import Floats, Ints, cross, dot
 
@@ -28,19 +28,48 @@ class MeshArrays:
         name: what messages call it.
         positions: (V, 3) float64, world frame, scene units.
         triangles: (T, 3) integers into positions.
-        uv: (T, 3, 2) float texture coordinates of the corners.
-        material: (T,) integers into colors.
-        colors: what each material looks like.
+        corners: (T, 3, K) float, K values at each corner that the triangle's material asks for: texture
+            coordinates, vertex colors (linear light). What they mean, each material knows.
+        material: (T,) integers into materials.
+        materials: what the triangles look like.
         warnings: what the adapter had to leave out or assume.
     """
 
     name: str
     positions: Floats
     triangles: NDArray[Any]
-    uv: NDArray[Any]
+    corners: NDArray[Any]
     material: NDArray[Any]
-    colors: tuple[Color, ...]
+    materials: tuple[Material, ...]
     warnings: tuple[str, ...] = ()
+
+
+def join_meshes(parts: Sequence[MeshArrays], name: str) -> MeshArrays:
+    """Several meshes as one, in their order; a material that they share stays one."""
+    if len(parts) == 1:
+        return replace(parts[0], name=name)
+    materials: dict[int, Material] = {}
+    for part in parts:
+        materials.update((id(material), material) for material in part.materials)
+    place = {key: index for index, key in enumerate(materials)}
+    vertex_start = np.cumsum([0] + [len(part.positions) for part in parts[:-1]])
+    width = max(part.corners.shape[2] for part in parts)
+    corners = np.zeros((sum(len(part.triangles) for part in parts), 3, width), parts[0].corners.dtype)
+    row = 0
+    for part in parts:
+        corners[row : row + len(part.triangles), :, : part.corners.shape[2]] = part.corners
+        row += len(part.triangles)
+    return MeshArrays(
+        name=name,
+        positions=np.concatenate([part.positions for part in parts]),
+        triangles=np.concatenate([part.triangles + start for part, start in zip(parts, vertex_start, strict=True)]),
+        corners=corners,
+        material=np.concatenate(
+            [np.array([place[id(material)] for material in part.materials])[part.material] for part in parts]
+        ),
+        materials=tuple(materials.values()),
+        warnings=tuple(dict.fromkeys(warning for part in parts for warning in part.warnings)),
+    )
 
 
 @dataclass(frozen=True)
@@ -82,7 +111,7 @@ class Surface:
     Attributes:
         vertices: (V, 3) float64 in the metric's frame; no two are equal, each is used.
         triangles: (T, 3) int64; none is degenerate, none repeats another.
-        uv: (T, 3, 2) float64, finite; material: (T,) int64; colors: as in MeshArrays.
+        corners: (T, 3, K) float64, finite; material: (T,) int64; materials: as in MeshArrays.
         source: (T,) int64, the row of each triangle in MeshArrays.
     """
 
@@ -90,25 +119,43 @@ class Surface:
     frame: Frame
     vertices: Floats
     triangles: Ints
-    uv: Floats
+    corners: Floats
     material: Ints
-    colors: tuple[Color, ...]
+    materials: tuple[Material, ...]
     source: Ints
     query: SurfaceQuery
     warnings: tuple[str, ...]
 
     def color_at(self, triangle: Ints, barycentric: Floats) -> Floats:
         """Equations (5) to (7): (N, 3) float64 sRGB colors at barycentric (N, 3) places of (N,) triangles."""
-        uv = np.einsum("nk,nkc->nc", barycentric, self.uv.take(triangle, axis=0))
-        if len(self.colors) == 1:
-            return self.colors[0].lookup(uv)
+        values = self._interpolated(triangle, barycentric)
+        if len(self.materials) == 1:
+            return self.materials[0].color.lookup(values)
+        result = np.empty((len(values), 3))
+        for material, here in self._by_material(triangle):
+            result[here] = material.color.lookup(values[here])
+        return result
+
+    def alpha_at(self, triangle: Ints, barycentric: Floats) -> Floats:
+        """(N,) float64 opacities in [0, 1] at such places; 1 where a material has none."""
+        values = self._interpolated(triangle, barycentric)
+        result = np.ones(len(values))
+        for material, here in self._by_material(triangle):
+            if material.alpha is not None:
+                result[here] = material.alpha.opacity(values[here])
+        return result
+
+    def _interpolated(self, triangle: Ints, barycentric: Floats) -> Floats:
+        """(N, K) the corners' values at such places."""
+        return np.einsum("nk,nkc->nc", barycentric, self.corners.take(triangle, axis=0))
+
+    def _by_material(self, triangle: Ints) -> Iterator[tuple[Material, Ints]]:
+        """Each material that some of the triangles have, with the rows that have it."""
         material = self.material[triangle]
-        result = np.empty((len(uv), 3))
-        for index, color in enumerate(self.colors):
+        for index, each in enumerate(self.materials):
             here = np.flatnonzero(material == index)
             if here.size:
-                result[here] = color.lookup(uv[here])
-        return result
+                yield each, here
 
 
 def prepare_surface(mesh: MeshArrays, build_query: QueryBuilder, frame: Frame | None = None) -> Surface:
@@ -170,20 +217,20 @@ def preparing_surface(
     yield 0.6
     vertices, triangles = _used_only(positions, triangles)
 
-    uv = np.asarray(mesh.uv, np.float64)[source]
-    if not np.isfinite(uv).all():
-        strange = np.count_nonzero(~np.isfinite(uv).all(axis=(1, 2)))
+    corners = np.asarray(mesh.corners, np.float64)[source]
+    if not np.isfinite(corners).all():
+        strange = np.count_nonzero(~np.isfinite(corners).all(axis=(1, 2)))
         warnings.append(f"{mesh.name}: {strange} triangles have UVs that are not finite; taken as 0")
-        uv = np.where(np.isfinite(uv), uv, 0.0)
+        corners = np.where(np.isfinite(corners), corners, 0.0)
     yield 0.7
     return Surface(
         name=mesh.name,
         frame=frame,
         vertices=vertices,
         triangles=triangles,
-        uv=uv,
+        corners=corners,
         material=np.asarray(mesh.material, np.int64)[source],
-        colors=mesh.colors,
+        materials=mesh.materials,
         source=source,
         query=build_query(vertices, triangles),
         warnings=tuple(warnings),

@@ -152,8 +152,11 @@ def export(folder: Path, kind: str, stem: str = "asset") -> Path:
 
 def same(a: MeshArrays, b: MeshArrays) -> bool:
     """The same arrays, but for the name."""
-    pairs = [(getattr(a, name), getattr(b, name)) for name in ("positions", "triangles", "uv", "material")]
-    pairs += [(getattr(x, "pixels", x), getattr(y, "pixels", y)) for x, y in zip(a.colors, b.colors, strict=True)]
+    pairs = [(getattr(a, name), getattr(b, name)) for name in ("positions", "triangles", "corners", "material")]
+    pairs += [
+        (getattr(x.color, "pixels", x.color), getattr(y.color, "pixels", y.color))
+        for x, y in zip(a.materials, b.materials, strict=True)
+    ]
     return all(np.array_equal(x, y) for x, y in pairs)
 
 

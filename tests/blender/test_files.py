@@ -64,9 +64,9 @@ def test_kinds_hold_the_same_surface(monkeys: Path, original: MeshArrays, kind: 
 @pytest.mark.parametrize("kind", scenes.COLORED)
 def test_kinds_hold_the_same_colors(monkeys: Path, original: MeshArrays, kind: str) -> None:
     arrays = load_mesh(str(monkeys / f"monkey.{kind}"))
-    (color,) = arrays.colors
+    color = arrays.materials[0].color
     assert np.array_equal(color.pixels, PIXELS) and not arrays.warnings
-    centers = [mesh.uv.reshape(-1, 2).mean(axis=0) for mesh in (arrays, original)]
+    centers = [mesh.corners.reshape(-1, 2).mean(axis=0) for mesh in (arrays, original)]
     assert centers[0] == pytest.approx(centers[1], abs=1e-5)
 
 
@@ -118,7 +118,7 @@ def test_given_texture_replaces_the_files_own(monkeys: Path) -> None:
     texture = Texture(scenes.noise(seed=9))
     for kind in ("glb", "ply"):
         arrays = load_mesh(str(monkeys / f"monkey.{kind}"), texture)
-        assert arrays.colors == (texture,) and not arrays.warnings
+        assert arrays.materials[0].color is texture and not arrays.warnings
 
 
 @pytest.mark.parametrize("kind", ["stl", "abc"])

@@ -80,7 +80,7 @@ def two_uv_maps() -> bpy.types.Object:
     second = object_.data.uv_layers.new(name="Second")
     values = np.empty(8, np.float32)
     first.uv.foreach_get("vector", values)
-    second.uv.foreach_set("vector", 1 - values)
+    second.corners.foreach_set("vector", 1 - values)
     second.active_render = True
     object_.data.uv_layers.active_index = 0
     return object_
@@ -102,7 +102,7 @@ def test_uv_map_is_the_named_one_or_the_one_for_rendering(tmp_path: Path, node: 
     object_.data.materials.append(material)
     arrays = mesh_arrays([object_], "asset")
     xy = arrays.positions[arrays.triangles][:, :, :2]
-    assert arrays.uv == pytest.approx(1 - xy if turned else xy)
+    assert arrays.corners == pytest.approx(1 - xy if turned else xy)
     assert not arrays.warnings
 
 
@@ -118,7 +118,7 @@ def test_slots_of_one_object_use_their_own_uv_maps(tmp_path: Path) -> None:
         object_.data.materials.append(material)
     first = mesh_arrays([object_], "asset")
     object_.data.polygons[0].material_index = 1
-    assert mesh_arrays([object_], "asset").uv == pytest.approx(1 - first.uv)
+    assert mesh_arrays([object_], "asset").corners == pytest.approx(1 - first.corners)
 
 
 def test_uv_map_that_the_mesh_lacks_is_named(tmp_path: Path) -> None:

@@ -31,7 +31,7 @@ def subdivided(name: str = "Cube", **options: object) -> bpy.types.Object:
 def test_quads_become_triangles_with_the_same_surface() -> None:
     arrays = mesh_arrays([scenes.cube()], "asset")
     assert arrays.positions.shape == (8, 3) and arrays.positions.dtype == np.float64
-    assert arrays.triangles.shape == (12, 3) and arrays.uv.shape == (12, 3, 2) and arrays.material.shape == (12,)
+    assert arrays.triangles.shape == (12, 3) and arrays.corners.shape == (12, 3, 2) and arrays.material.shape == (12,)
     assert scenes.area(arrays) == pytest.approx(24)
     assert arrays.name == "asset"
 
@@ -47,7 +47,7 @@ def test_concave_ngon_is_cut_inside_its_outline() -> None:
 
 def test_corner_uvs_follow_their_corners() -> None:
     arrays = mesh_arrays([scenes.square(materials=[textured()])], "asset")
-    assert arrays.uv == pytest.approx(arrays.positions[arrays.triangles][:, :, :2])
+    assert arrays.corners == pytest.approx(arrays.positions[arrays.triangles][:, :, :2])
 
 
 def textured() -> bpy.types.Material:
@@ -108,7 +108,7 @@ def test_negative_scale_mirrors() -> None:
     arrays = mesh_arrays([object_], "asset")
     assert arrays.positions[:, 0].min() == -2 and arrays.positions[:, 0].max() == 0
     corners = arrays.positions[arrays.triangles]
-    assert arrays.uv == pytest.approx(corners[:, :, :2] / [-2, 1])  # UVs stay with their vertices
+    assert arrays.corners == pytest.approx(corners[:, :, :2] / [-2, 1])  # UVs stay with their vertices
 
 
 def test_every_material_slot_has_its_own_color(tmp_path: Path) -> None:
@@ -119,7 +119,7 @@ def test_every_material_slot_has_its_own_color(tmp_path: Path) -> None:
     slot_of_face = [0, 1, 2, 2, 1, 0]
     object_.data.polygons.foreach_set("material_index", slot_of_face)
     arrays = mesh_arrays([object_], "asset")
-    shown = [arrays.colors[index] for index in arrays.material]
+    shown = [arrays.materials[index].color for index in arrays.material]
     for triangle, color in zip(arrays.triangles, shown, strict=True):
         face = next(k for k, corners in enumerate(scenes.CUBE_FACES) if set(triangle.tolist()) <= set(corners))
         if slot_of_face[face] == 1:
@@ -132,7 +132,7 @@ def test_colors_of_joined_objects_stay_apart() -> None:
     red, blue = scenes.material("Red", (1, 0, 0)), scenes.material("Blue", (0, 0, 1))
     objects = [scenes.cube("A", materials=[red]), scenes.cube("B", materials=[blue]), scenes.cube("C", materials=[red])]
     arrays = mesh_arrays(objects, "asset")
-    rgb = np.array([color.rgb for color in arrays.colors])[arrays.material]
+    rgb = np.array([look.color.rgb for look in arrays.materials])[arrays.material]
     assert rgb == pytest.approx(np.repeat([(1, 0, 0), (0, 0, 1), (1, 0, 0)], 12, axis=0))
 
 
@@ -140,14 +140,14 @@ def test_material_linked_to_the_object_wins() -> None:
     object_ = scenes.square(materials=[scenes.material("Data", (1, 0, 0))])
     object_.material_slots[0].link = "OBJECT"
     object_.material_slots[0].material = scenes.material("Object", (0, 0, 1))
-    (color,) = mesh_arrays([object_], "asset").colors
+    color = mesh_arrays([object_], "asset").materials[0].color
     assert color.rgb == pytest.approx((0, 0, 1))
 
 
 def test_face_beyond_the_last_slot_has_the_last() -> None:
     object_ = scenes.square(materials=[scenes.material("First", (1, 0, 0)), scenes.material("Last", (0, 0, 1))])
     object_.data.polygons[0].material_index = 7
-    (color,) = mesh_arrays([object_], "asset").colors
+    color = mesh_arrays([object_], "asset").materials[0].color
     assert color.rgb == pytest.approx((0, 0, 1))
 
 
@@ -155,7 +155,7 @@ def test_face_beyond_the_last_slot_has_the_last() -> None:
 def test_without_material_default_grey_and_a_warning(materials: list[None]) -> None:
     arrays = mesh_arrays([scenes.square("Bare", uv=False, materials=materials)], "asset")
     grey = 1.055 * 0.8 ** (1 / 2.4) - 0.055
-    assert arrays.colors[0].rgb == pytest.approx((grey,) * 3)
+    assert arrays.materials[0].color.rgb == pytest.approx((grey,) * 3)
     assert len(arrays.warnings) == 1 and "Bare" in arrays.warnings[0] and "grey" in arrays.warnings[0]
 
 
@@ -165,7 +165,7 @@ def test_the_given_texture_replaces_all_materials() -> None:
     texture = Texture(scenes.noise())
     objects = [scenes.square("A", materials=[broken]), scenes.square("B")]
     arrays = mesh_arrays(objects, "asset", texture)
-    assert all(color is texture for color in arrays.colors) and not arrays.warnings
+    assert all(look.color is texture for look in arrays.materials) and not arrays.warnings
 
 
 def excluded(object_: bpy.types.Object) -> None:

@@ -118,7 +118,7 @@ def shuffled(mesh: MeshArrays, seed: int = 0) -> MeshArrays:
         mesh,
         positions=positions,
         triangles=new_place[mesh.triangles[row, corner]],
-        uv=mesh.uv[row, corner],
+        corners=mesh.corners[row, corner],
         material=mesh.material[faces],
     )
 
@@ -142,7 +142,7 @@ def test_another_format_is_the_same_mesh(fast: tuple[Path, MeshArrays, Measureme
     """PLY names no image; it gets the same one by hand."""
     path, mesh, measurement = fast
     open_file(str(path))
-    again = load_mesh(str(scenes.export(tmp_path, kind)), mesh.colors[0] if kind == "ply" else None)
+    again = load_mesh(str(scenes.export(tmp_path, kind)), mesh.materials[0].color if kind == "ply" else None)
     mine = scores(measurement, again)
     print(mesh.name, kind, 1 - mine)
     assert (1 - mine <= SAME_CONTENT).all() and (mine <= 1).all()

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fmqm_addon.blender.bvh import BVHQuery
-from fmqm_addon.metric.color import Texture, srgb_to_lab
+from fmqm_addon.metric.color import Material, Texture, srgb_to_lab
 from fmqm_addon.metric.errors import FileError, FMQMError
 from fmqm_addon.metric.score import COLUMNS, Evaluation, Result
 from fmqm_addon.metric.settings import Settings
@@ -21,6 +21,8 @@ from fmqm_addon.report.picture import Camera, render, score_by_face, score_color
 RED, GREEN, BLUE, YELLOW = (200, 20, 20), (20, 200, 20), (20, 20, 200), (200, 200, 20)
 FRONT = {"azimuth": 0.0, "elevation": 0.0}
 FEW = Settings(samples=2000, patches=20)
+
+FOUR = np.array([[RED, GREEN], [BLUE, YELLOW]], np.uint8)
 
 
 def wall(cells: int, frame: Frame | None = None, width: float = 2.0) -> Surface:
@@ -34,9 +36,9 @@ def wall(cells: int, frame: Frame | None = None, width: float = 2.0) -> Surface:
         name="wall",
         positions=np.stack([width * u, 0 * u, 2 * v], axis=1),
         triangles=triangles,
-        uv=np.stack([u, v], axis=1)[triangles],
+        corners=np.stack([u, v], axis=1)[triangles],
         material=np.zeros(len(triangles), np.int64),
-        colors=(Texture(np.array([[RED, GREEN], [BLUE, YELLOW]], np.uint8), interpolation="closest"),),
+        materials=(Material("four", Texture(FOUR, interpolation="closest")),),
     )
     return prepare_surface(mesh, BVHQuery, frame)
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fmqm_addon.metric.color import Color, PlainColor, Texture
+from fmqm_addon.metric.color import Color, Material, PlainColor, Texture
 from fmqm_addon.metric.score import Evaluation, Result
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.spatial import Floats, Ints
@@ -83,6 +83,10 @@ def texture(seed: int = 0, size: int = 8) -> Texture:
     return Texture(np.random.default_rng(seed).integers(0, 256, (size, size, 3), np.uint8))
 
 
+def materials(*colors: Color) -> tuple[Material, ...]:
+    return tuple(Material(f"material {index}", color) for index, color in enumerate(colors))
+
+
 def mesh_arrays(
     shape: tuple[Floats, Ints], colors: tuple[Color, ...] = (PlainColor((0.8, 0.4, 0.2)),), name: str = "mesh"
 ) -> MeshArrays:
@@ -91,7 +95,7 @@ def mesh_arrays(
     low = positions.min(axis=0)
     x, y, z = ((positions - low) / max(np.ptp(positions), 1e-300)).T
     uv = np.stack([x + z / 3, y - z / 4], axis=1)[triangles]
-    return MeshArrays(name, positions, triangles, uv, np.arange(len(triangles)) % len(colors), colors)
+    return MeshArrays(name, positions, triangles, uv, np.arange(len(triangles)) % len(colors), materials(*colors))
 
 
 def surface(

@@ -16,7 +16,7 @@ from fmqm_addon.metric.fields import Fields, _coarse_to_fine, _guide, count_cros
 from fmqm_addon.metric.spatial import Floats, Ints, morton_order
 from fmqm_addon.metric.surface import MeshArrays, Surface, prepare_surface
 
-from .meshes import TETRAHEDRON, cube, grid, icosahedron, sphere, surface, texture
+from .meshes import TETRAHEDRON, cube, grid, icosahedron, materials, sphere, surface, texture
 from .oracles import NaiveQuery, exact_distance, texture_color, winding_number
 
 seeds = st.integers(0, 2**32 - 1)
@@ -62,8 +62,8 @@ def test_fields_of_a_closed_mesh(seed: int, name: str, count: int, spread: float
         a, b, c = corners[found.triangle[n]]
         weights = np.linalg.lstsq(np.stack([a, b, c]).T, found.nearest[n], rcond=None)[0]
         if abs(np.linalg.det(np.stack([a, b, c]))) > 1e-3:  # else the weights are not unique
-            u, v = (weights / weights.sum()) @ shape.uv[found.triangle[n]]
-            np.testing.assert_allclose(found.ncf[n], texture_color(shape.colors[0], u, v), atol=1e-5)  # type: ignore[arg-type]
+            u, v = (weights / weights.sum()) @ shape.corners[found.triangle[n]]
+            np.testing.assert_allclose(found.ncf[n], texture_color(shape.materials[0].color, u, v), atol=1e-5)  # type: ignore[arg-type]
 
 
 @given(seeds, st.integers(1, 80))
@@ -196,7 +196,7 @@ def test_ties_on_edges_do_not_depend_on_the_order_of_triangles(seed: int) -> Non
     rng = np.random.default_rng(seed)
     positions = np.array([[0, 0, 0.5], [1, 0, 0.5], [0, -1, 0], [1, -1, 0], [0, 1, 0], [1, 1, 0.0]])
     triangles = np.array([[0, 2, 1], [1, 2, 3], [0, 1, 4], [1, 5, 4]])
-    colors = (PlainColor((1, 0, 0)), PlainColor((0, 0, 1)))
+    colors = materials(PlainColor((1, 0, 0)), PlainColor((0, 0, 1)))
     points = rng.uniform([0.1, -0.2, 0.6], [0.9, 0.2, 0.9], (40, 3))
     order = rng.permutation(4)
     found = []

@@ -28,6 +28,7 @@ from .meshes import (
     evaluate,
     grid,
     icosahedron,
+    materials,
     mesh_arrays,
     moved,
     shaken,
@@ -67,7 +68,7 @@ def textured(name: str) -> MeshArrays:
 def pair(seed: int = 0, amount: float = 0.02) -> tuple[MeshArrays, MeshArrays]:
     """A sphere, and the same one shaken, in other colors."""
     reference = mesh_arrays(sphere(), (texture(1),), "ref")
-    return reference, replace(shaken(reference, amount, seed), colors=(texture(2),), name="dist")
+    return reference, replace(shaken(reference, amount, seed), materials=materials(texture(2)), name="dist")
 
 
 def same_bits(one: Result, other: Result) -> bool:
@@ -129,7 +130,7 @@ def test_itself_is_exactly_1_for_random_soups(seed: int) -> None:
     triangles = rng.integers(0, 12, (25, 3))
     pixels = rng.random((3, 5, 3), np.float32)
     colors = (Texture(pixels, "mirror"), Texture(pixels, "clip", "closest"), PlainColor((0, 0, 0)))
-    mesh = replace(mesh_arrays((positions, triangles), colors), uv=rng.normal(0, 2, (25, 3, 2)))
+    mesh = replace(mesh_arrays((positions, triangles), colors), corners=rng.normal(0, 2, (25, 3, 2)))
     result = evaluate(mesh, mesh, replace(SMALL, gradient_radius=[0.125, math.inf][seed % 2]))
     assert result.scores.tolist() == [1.0] * 5
 
@@ -144,9 +145,9 @@ def test_itself_in_another_order_is_1() -> None:
         "other",
         mesh.positions[np.take_along_axis(mesh.triangles[order], corners, 1)].reshape(-1, 3),
         np.arange(3 * len(order)).reshape(-1, 3),
-        np.take_along_axis(mesh.uv[order], corners[..., None], 1),
+        np.take_along_axis(mesh.corners[order], corners[..., None], 1),
         mesh.material[order],
-        mesh.colors,
+        mesh.materials,
     )
     np.testing.assert_allclose(evaluate(mesh, other).scores, 1, atol=1e-4)
 
@@ -158,7 +159,8 @@ def test_itself_in_another_order_is_1() -> None:
 @given(seeds, st.sampled_from(sorted(SHAPES)), st.sampled_from(sorted(SHAPES)), st.sampled_from(VARIANTS))
 def test_scores_of_any_pair_are_in_range(seed: int, one: str, other: str, variant: dict[str, Any]) -> None:
     distorted = replace(
-        shaken(textured(other), 0.1, seed), colors=(PlainColor((0, 0, 0)), texture(3))[: len(textured(other).colors)]
+        shaken(textured(other), 0.1, seed),
+        materials=materials(PlainColor((0, 0, 0)), texture(3))[: len(textured(other).materials)],
     )
     check_range(evaluate(textured(one), distorted, replace(SMALL, **variant)))
 
@@ -280,7 +282,7 @@ def test_moved_regular_meshes_keep_their_patches(diagonals: float) -> None:
     positions, triangles = grid(12, 12)
     turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
     reference = mesh_arrays((positions @ turn.T @ turn, triangles), (texture(1),))
-    distorted = replace(shaken(reference, 0.01), colors=(texture(2),))
+    distorted = replace(shaken(reference, 0.01), materials=materials(texture(2)))
     shift = diagonals * 17 * np.array([0.6, -0.64, 0.48])
     here = evaluate(reference, distorted)
     there = evaluate(moved(reference, 1, shift), moved(distorted, 1, shift))
@@ -394,12 +396,12 @@ def test_more_distortion_scores_less(amounts: tuple[float, ...]) -> None:
     geometry = [evaluate(reference, shaken(reference, amount)).scores for amount in amounts]
     assert geometry[0][0] > geometry[1][0] > geometry[2][0]
     assert geometry[0][1] > geometry[1][1] > geometry[2][1]
-    pixels = reference.colors[0].pixels.astype(float)  # type: ignore[union-attr]
+    pixels = reference.materials[0].color.pixels.astype(float)  # type: ignore[union-attr]
     noise = np.random.default_rng(0).normal(0, 1, pixels.shape)
     color = []
     for amount in (3, 30, 200):
         noisy = Texture((pixels + amount * noise).clip(0, 255).astype(np.uint8))
-        color.append(evaluate(reference, replace(reference, colors=(noisy,))).scores)
+        color.append(evaluate(reference, replace(reference, materials=materials(noisy))).scores)
     assert color[0][2] > color[1][2] > color[2][2]
     assert color[0][3] > color[1][3] > color[2][3]
     assert all(scores[:2].tolist() == [1, 1] for scores in color)

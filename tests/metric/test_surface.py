@@ -18,7 +18,7 @@ from fmqm_addon.metric.errors import FMQMError, MeshError
 from fmqm_addon.metric.spatial import Floats, Ints
 from fmqm_addon.metric.surface import MeshArrays, prepare_surface, triangle_areas, triangle_normals, weld
 
-from .meshes import TETRAHEDRON, TRIANGLE, cube, mesh_arrays, moved, surface
+from .meshes import TETRAHEDRON, TRIANGLE, cube, materials, mesh_arrays, moved, surface
 from .oracles import NaiveQuery, first_of_each, heron, weld_with_dict
 
 seeds = st.integers(0, 2**32 - 1)
@@ -99,7 +99,7 @@ def test_corner_uvs_and_materials_follow_their_triangles() -> None:
     uv = np.arange(30.0).reshape(5, 3, 2)
     mesh = MeshArrays("m", positions, triangles, uv, np.array([9, 0, 1, 0, 1]), (PlainColor((0, 0, 0)),) * 2)
     prepared = prepare_surface(mesh, NaiveQuery)
-    assert np.array_equal(prepared.uv, uv[1:])
+    assert np.array_equal(prepared.corners, uv[1:])
     assert prepared.material.tolist() == [0, 1, 0, 1]
 
 
@@ -197,7 +197,7 @@ def test_normals_of_the_closed_meshes_point_outward() -> None:
 
 def test_color_at_looks_up_each_triangles_own_material() -> None:
     pixels = np.array([[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [255, 255, 255]]], np.uint8)
-    colors = (PlainColor((0.1, 0.2, 0.3)), Texture(pixels, interpolation="closest"), PlainColor((1, 0, 1)))
+    colors = materials(PlainColor((0.1, 0.2, 0.3)), Texture(pixels, interpolation="closest"), PlainColor((1, 0, 1)))
     uv = np.tile([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], (4, 1, 1))
     positions, triangles = TETRAHEDRON
     prepared = prepare_surface(MeshArrays("m", positions, triangles, uv, np.array([0, 1, 1, 2]), colors), NaiveQuery)
@@ -210,7 +210,7 @@ def test_uv_is_interpolated_with_barycentric_coordinates() -> None:
     """Equation (5): the weighted mean of the corners' coordinates."""
     ramp = np.linspace(0, 1, 11, dtype=np.float32)[None, :, None] * np.ones((1, 1, 3), np.float32)
     prepared = surface(TRIANGLE, (Texture(ramp, "extend"),))
-    corner_u = prepared.uv[0, :, 0]
+    corner_u = prepared.corners[0, :, 0]
     weights = np.random.default_rng(0).dirichlet([1, 1, 1], 20)
     expected = ((weights @ corner_u) * 11 - 0.5).clip(0, 10) / 10
     np.testing.assert_allclose(prepared.color_at(np.zeros(20, int), weights)[:, 0], expected, atol=1e-6)
@@ -220,7 +220,7 @@ def test_the_border_of_a_clipped_image_is_not_black() -> None:
     """A face whose corners all lie at (1, 1) is on the image wherever one looks."""
     white = Texture(np.full((4, 4, 3), 255, np.uint8), "clip")
     positions, triangles = TRIANGLE
-    mesh = MeshArrays("m", positions, triangles, np.ones((1, 3, 2)), np.zeros(1, int), (white,))
+    mesh = MeshArrays("m", positions, triangles, np.ones((1, 3, 2)), np.zeros(1, int), materials(white))
     prepared = prepare_surface(mesh, NaiveQuery)
     weights = np.random.default_rng(0).dirichlet([1, 1, 1], 500)
     assert (prepared.color_at(np.zeros(500, int), weights) == 1).all()
@@ -229,8 +229,8 @@ def test_the_border_of_a_clipped_image_is_not_black() -> None:
 def test_uvs_that_are_not_finite_are_taken_as_0() -> None:
     positions, triangles = TETRAHEDRON
     mesh = plain(positions, triangles)
-    mesh.uv[0, 1] = np.nan, 0.5
-    mesh.uv[2, 0] = 0.25, -np.inf
+    mesh.corners[0, 1] = np.nan, 0.5
+    mesh.corners[2, 0] = 0.25, -np.inf
     prepared = prepare_surface(mesh, NaiveQuery)
-    assert prepared.uv[0, 1].tolist() == [0, 0.5] and prepared.uv[2, 0].tolist() == [0.25, 0]
+    assert prepared.corners[0, 1].tolist() == [0, 0.5] and prepared.corners[2, 0].tolist() == [0.25, 0]
     assert any("2 triangles have UVs that are not finite" in warning for warning in prepared.warnings)
