@@ -80,7 +80,7 @@ def two_uv_maps() -> bpy.types.Object:
     second = object_.data.uv_layers.new(name="Second")
     values = np.empty(8, np.float32)
     first.uv.foreach_get("vector", values)
-    second.corners.foreach_set("vector", 1 - values)
+    second.uv.foreach_set("vector", 1 - values)
     second.active_render = True
     object_.data.uv_layers.active_index = 0
     return object_
