@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from . import look, operators, panels, properties, scene, watch
+from . import inputs, look, measuring, panels, properties, results, scene, watch
 
 _look_groups = tuple(cls for cls in look.CLASSES if issubclass(cls, bpy.types.PropertyGroup))
 _look_rest = tuple(cls for cls in look.CLASSES if cls not in _look_groups)
@@ -15,7 +15,9 @@ CLASSES: tuple[type, ...] = (
     *properties.CLASSES,
     *_look_groups,
     *scene.CLASSES,
-    *operators.CLASSES,
+    *inputs.CLASSES,
+    *measuring.CLASSES,
+    *results.CLASSES,
     *panels.CLASSES,
     *_look_rest,
 )
@@ -25,7 +27,7 @@ def register() -> None:
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     scene.register()
-    operators.register()
+    measuring.register()
     watch.register()
     look.register()
 
@@ -34,7 +36,7 @@ def unregister() -> None:
     """The exact mirror of register."""
     look.unregister()
     watch.unregister()
-    operators.unregister()
+    measuring.unregister()
     scene.unregister()
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

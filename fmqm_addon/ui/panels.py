@@ -12,8 +12,9 @@ from ..blender.space import PLACE_LABELS
 from ..metric.score import COLUMNS
 from ..report.pair import SHOWN
 from . import session
-from .operators import EXPLAINED, active_row, why_not
+from .measuring import why_not
 from .properties import FMQMItem, FMQMRow, row_scores, row_stderr
+from .results import EXPLAINED, active_row
 from .scene import FMQMScene
 
 _WIDE = 330  # pixels at scale 1: from here on the rows have room for the four features

@@ -16,7 +16,7 @@ import fmqm_addon
 from fmqm_addon import api, ui
 from fmqm_addon.metric.score import COLUMNS
 from fmqm_addon.metric.settings import Settings
-from fmqm_addon.ui import operators, panels, session, watch
+from fmqm_addon.ui import inputs, measuring, panels, results, session, watch
 from fmqm_addon.ui.properties import metric_settings, row_scores
 
 from . import scenes
@@ -62,8 +62,8 @@ def select(*objects: bpy.types.Object) -> None:
 
 
 def compare(reference: bpy.types.Object, *compared: bpy.types.ID) -> None:
-    operators._set_reference(bpy.context.scene.fmqm, reference)
-    operators._set_compared(bpy.context.scene.fmqm, compared)
+    inputs.set_reference(bpy.context.scene.fmqm, reference)
+    inputs.set_compared(bpy.context.scene.fmqm, compared)
 
 
 def numbers(row: bpy.types.PropertyGroup) -> list[float]:
@@ -409,7 +409,7 @@ def test_texts() -> None:
             assert prop.name and prop.description, (cls, prop.identifier)
             assert not prop.description.endswith("."), prop.description
             assert all(word in small or word[0].isupper() or word[0] in "(" for word in prop.name.split()), prop.name
-    for cls in (*operators.CLASSES, *panels.CLASSES):
+    for cls in (*inputs.CLASSES, *measuring.CLASSES, *results.CLASSES, *panels.CLASSES):
         label = "" if cls is panels.FMQM_PT_presets else getattr(cls, "bl_label", "")  # Blender writes into that one
         assert all(word in small or not word[0].islower() for word in label.split()), label
         if issubclass(cls, bpy.types.Operator):

@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Buttons that choose what is compared with what."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import bpy
+
+from ..blender.lods import find_lods
+from .properties import is_asset
+from .scene import FMQMScene
+
+
+def _selected_assets(context: bpy.types.Context) -> list[bpy.types.Object]:
+    return sorted((o for o in context.selected_objects if is_asset(o)), key=lambda o: o.name_full)
+
+
+def set_compared(fmqm: FMQMScene, assets: Sequence[bpy.types.Object | bpy.types.Collection]) -> None:
+    fmqm.compared.clear()
+    for asset in assets:
+        _add_compared(fmqm, asset)
+    fmqm.compared_index = 0
+
+
+def _add_compared(fmqm: FMQMScene, asset: bpy.types.Object | bpy.types.Collection) -> None:
+    item = fmqm.compared.add()
+    item.name = asset.name
+    if isinstance(asset, bpy.types.Collection):
+        item.collection = asset
+    else:
+        item.object = asset
+
+
+def set_reference(fmqm: FMQMScene, asset: bpy.types.Object | bpy.types.Collection) -> None:
+    fmqm.bare_reference = False
+    if isinstance(asset, bpy.types.Collection):
+        fmqm.reference_kind, fmqm.reference_collection = "COLLECTION", asset
+    else:
+        fmqm.reference_kind, fmqm.reference = "OBJECT", asset
+
+
+def reference_of(fmqm: FMQMScene) -> bpy.types.Object | bpy.types.Collection | None:
+    """The asset that stands as the reference in the panel."""
+    return fmqm.reference if fmqm.reference_kind == "OBJECT" else fmqm.reference_collection
+
+
+class FMQM_OT_use_selection(bpy.types.Operator):  # noqa: N801
+    bl_idname = "fmqm.use_selection"
+    bl_label = "Use Selection"
+    bl_description = "The active object becomes the reference, the other selected objects are compared with it"
+    bl_options: ClassVar = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        active = context.active_object
+        if active is None or not is_asset(active):
+            cls.poll_message_set("Make the original the active object: click it last")
+            return False
+        if not any(o != active and is_asset(o) for o in context.selected_objects):
+            cls.poll_message_set("Select the objects to compare, and the original last")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        fmqm, active = context.scene.fmqm, context.active_object
+        set_reference(fmqm, active)
+        set_compared(fmqm, [o for o in _selected_assets(context) if o != active])
+        return {"FINISHED"}
+
+
+class FMQM_OT_find_lods(bpy.types.Operator):  # noqa: N801
+    bl_idname = "fmqm.find_lods"
+    bl_label = "Find LODs"
+    bl_description = (
+        "Find the levels of detail of the active object by their names (Rock_LOD0, LOD1_Rock, Rock.LOD2), "
+        "an FBX LOD group or its collection. The finest is the reference"
+    )
+    bl_options: ClassVar = {"REGISTER", "UNDO"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        found = find_lods(context.scene, context.active_object)
+        if found is None or len(found.levels) < 2:
+            self.report(
+                {"WARNING"},
+                "No levels of detail found: make one of them active. Names such as Rock_LOD0 and Rock_LOD1 tell",
+            )
+            return {"CANCELLED"}
+        fmqm = context.scene.fmqm
+        set_reference(fmqm, found.levels[0])
+        set_compared(fmqm, found.levels[1:])
+        self.report({"INFO"}, f"{found.levels[0].name} and {len(found.levels) - 1} levels, by {found.how}")
+        return {"FINISHED"}
+
+
+class FMQM_OT_own_modifiers(bpy.types.Operator):  # noqa: N801
+    bl_idname = "fmqm.own_modifiers"
+    bl_label = "Own Modifiers"
+    bl_description = "Compare the active object as its modifiers make it with its mesh without them"
+    bl_options: ClassVar = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        active = context.active_object
+        if active is None or active.type != "MESH":
+            cls.poll_message_set("Make a mesh object active")
+            return False
+        if not active.modifiers:
+            cls.poll_message_set(f"{active.name} has no modifiers")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        fmqm, active = context.scene.fmqm, context.active_object
+        set_reference(fmqm, active)
+        set_compared(fmqm, [active])
+        fmqm.bare_reference = True
+        return {"FINISHED"}
+
+
+class FMQM_OT_add_selected(bpy.types.Operator):  # noqa: N801
+    bl_idname = "fmqm.add_selected"
+    bl_label = "Add Selected"
+    bl_description = "Add the selected objects to the list, but for the reference"
+    bl_options: ClassVar = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not any(is_asset(o) for o in context.selected_objects):
+            cls.poll_message_set("Select a mesh, or an empty with meshes")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        fmqm = context.scene.fmqm
+        there = {item.object for item in fmqm.compared} | {reference_of(fmqm)}
+        for object_ in _selected_assets(context):
+            if object_ not in there:
+                _add_compared(fmqm, object_)
+        fmqm.compared_index = max(0, len(fmqm.compared) - 1)
+        return {"FINISHED"}
+
+
+class FMQM_OT_add_collection(bpy.types.Operator):  # noqa: N801
+    bl_idname = "fmqm.add_collection"
+    bl_label = "Add Active Collection"
+    bl_description = "Add the active collection to the list; its meshes count as one object"
+    bl_options: ClassVar = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if context.collection is None or context.collection == context.scene.collection:
+            cls.poll_message_set("Choose a collection in the outliner")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        fmqm = context.scene.fmqm
+        if context.collection not in {item.collection for item in fmqm.compared}:
+            _add_compared(fmqm, context.collection)
+        fmqm.compared_index = len(fmqm.compared) - 1
+        return {"FINISHED"}
+
+
+class FMQM_OT_remove_compared(bpy.types.Operator):  # noqa: N801
+    bl_idname = "fmqm.remove_compared"
+    bl_label = "Remove"
+    bl_description = "Remove the chosen object from the list; the object itself stays"
+    bl_options: ClassVar = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return 0 <= context.scene.fmqm.compared_index < len(context.scene.fmqm.compared)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        fmqm = context.scene.fmqm
+        fmqm.compared.remove(fmqm.compared_index)
+        fmqm.compared_index = max(0, min(fmqm.compared_index, len(fmqm.compared) - 1))
+        return {"FINISHED"}
+
+
+class FMQM_OT_clear_compared(bpy.types.Operator):  # noqa: N801
+    bl_idname = "fmqm.clear_compared"
+    bl_label = "Clear List"
+    bl_description = "Empty the list; the objects themselves stay"
+    bl_options: ClassVar = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return bool(context.scene.fmqm.compared)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        set_compared(context.scene.fmqm, [])
+        return {"FINISHED"}
+
+
+CLASSES = (
+    FMQM_OT_use_selection,
+    FMQM_OT_find_lods,
+    FMQM_OT_own_modifiers,
+    FMQM_OT_add_selected,
+    FMQM_OT_add_collection,
+    FMQM_OT_remove_compared,
+    FMQM_OT_clear_compared,
+)

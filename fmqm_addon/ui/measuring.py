@@ -1,0 +1,265 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The measuring button: modal, cancellable; and the presets of its settings."""
+
+from __future__ import annotations
+
+import json
+import time
+import uuid
+from typing import ClassVar
+
+import bpy
+import numpy as np
+from bl_operators.presets import AddPresetBase
+
+from ..blender.job import Outcome, measuring
+from ..blender.snapshot import Target, target_of
+from ..metric.errors import FMQMError
+from ..metric.score import Stepper
+from . import session, watch
+from .inputs import reference_of
+from .properties import PRESET_PROPERTIES, FMQMRow, item_target, metric_settings, numbers_text
+from .scene import FMQMScene
+
+SLICE = 0.035  # seconds of work per tick of the timer: the window stays smooth
+SHOWN_EVERY = 0.2  # seconds between redraws of the progress
+TICK = 0.005  # seconds between ticks, for Blender to draw and listen
+
+
+def why_not(fmqm: FMQMScene) -> str:
+    """Why there is nothing to measure yet, for the greyed-out button; "" if there is. Cheap: it runs at each redraw."""
+    reference = reference_of(fmqm)
+    if reference is None:
+        return "Choose a reference: the original mesh"
+    compared = [target for item in fmqm.compared if (target := item_target(item)) is not None]
+    if not compared:
+        return "Add an object to compare with the reference"
+    if reference in compared and not fmqm.bare_reference:
+        return f"{reference.name} is the reference and in the list too; remove it there, or use Own Modifiers"
+    if fmqm.bare_reference and (fmqm.reference_kind != "OBJECT" or reference.type != "MESH"):
+        return "Without Modifiers needs a single mesh object as the reference"
+    return ""
+
+
+class FMQM_OT_measure(bpy.types.Operator):  # noqa: N801
+    """In the window it works between redraws and can be cancelled; called from Python it runs at once."""
+
+    bl_idname = "fmqm.measure"
+    bl_label = "Measure Quality"
+    bl_description = "Score the listed objects against the reference. Esc cancels"
+    bl_options: ClassVar = {"UNDO"}  # no REGISTER: adjusting the last operation would measure all over again
+
+    _stepper: Stepper[list[Outcome]]
+    _job: session.Job
+    _scene: str
+    _shown: float = 0.0
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        reason = "A measurement is running" if session.job is not None else why_not(context.scene.fmqm)
+        if reason:
+            cls.poll_message_set(reason)
+        return not reason
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        if not self._prepare(context):
+            return {"CANCELLED"}
+        self._stepper.run()
+        return self._finish(context)
+
+    def invoke(self, context: bpy.types.Context, _: bpy.types.Event) -> set[str]:
+        if bpy.app.background or context.window is None:
+            return self.execute(context)
+        if not self._prepare(context):
+            return {"CANCELLED"}
+        window_manager, stepper, workspace = context.window_manager, self._stepper, context.workspace
+        timer = window_manager.event_timer_add(TICK, window=context.window)
+
+        def stop() -> None:
+            """Once; from wherever the end comes."""
+            if session.job is not job:
+                return
+            session.job = None
+            stepper.cancel()
+            window_manager.event_timer_remove(timer)
+            workspace.status_text_set(None)
+            watch.redraw()
+            watch.soon()
+
+        self._job = job = session.job = session.Job(stop)
+        session.longest_tick = 0.0
+        window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        job = self._job
+        if session.job is not job:  # another file, or the add-on was disabled
+            return {"CANCELLED"}
+        if job.cancelled or (event.type == "ESC" and event.value == "PRESS"):
+            job.stop()
+            self.report({"INFO"}, "Measurement cancelled")
+            return {"CANCELLED"}
+        if event.type != "TIMER":
+            return {"PASS_THROUGH"}
+        try:
+            more = self._slice()
+        except BaseException:
+            job.stop()
+            raise
+        if more:
+            self._show(context, job)
+            return {"PASS_THROUGH"}
+        job.stop()
+        return self._finish(context)
+
+    def cancel(self, _: bpy.types.Context) -> None:
+        """Blender ends the operator: a window was closed, another file was opened."""
+        self._job.stop()
+
+    def _slice(self) -> bool:
+        """Some milliseconds of work; whether there is more."""
+        began = time.perf_counter()
+        more = True
+        while more and time.perf_counter() - began < SLICE:
+            more = self._stepper.step()
+        session.longest_tick = max(session.longest_tick, time.perf_counter() - began)
+        return more
+
+    def _show(self, context: bpy.types.Context, job: session.Job) -> None:
+        """Progress in sidebar and status bar, some times a second."""
+        progress = self._stepper.progress
+        job.progress = progress.done
+        now = time.perf_counter()
+        if progress.stage == job.text and now - self._shown < SHOWN_EVERY:
+            return
+        self._shown, job.text = now, progress.stage
+        context.workspace.status_text_set(f"FMQM: {job.text}, {100 * job.progress:.0f} %        Esc: Cancel")
+        watch.redraw()
+
+    def _prepare(self, context: bpy.types.Context) -> bool:
+        fmqm = context.scene.fmqm
+        try:
+            settings = metric_settings(fmqm.settings)
+        except FMQMError as error:
+            self.report({"ERROR"}, str(error))
+            return False
+        asked = {
+            "repeats": fmqm.settings.repeats,
+            "space": fmqm.settings.space.lower(),
+            "match_scale": fmqm.settings.match_scale,
+        }
+        compared = [target_of(target) for item in fmqm.compared if (target := item_target(item)) is not None]
+        self._scene = context.scene.name_full
+        self._settings_text = json.dumps({**settings.as_dict(), **asked})
+        self._stepper = measuring(
+            target_of(reference_of(fmqm), fmqm.bare_reference), list(dict.fromkeys(compared)), settings, **asked
+        )
+        return True
+
+    def _finish(self, context: bpy.types.Context) -> set[str]:
+        """All rows at once: one undo step."""
+        scene = next((scene for scene in bpy.data.scenes if scene.name_full == self._scene), None)
+        if scene is None:
+            self.report({"WARNING"}, "The scene is gone, and the scores with it")
+            return {"CANCELLED"}
+        outcomes = self._stepper.result
+        for outcome in outcomes:
+            _write_row(scene.fmqm, outcome, self._settings_text)
+        _choose_row(scene.fmqm, outcomes[0])
+        failed = [outcome for outcome in outcomes if outcome.error]
+        total = sum(outcome.seconds.get("total", 0.0) for outcome in outcomes)
+        if failed:
+            # Not an ERROR: that would make the call raise although the other rows have their scores.
+            self.report({"WARNING"}, f"{len(failed)} of {len(outcomes)} not measured: {failed[0].error}")
+        else:
+            self.report({"INFO"}, f"{len(outcomes)} measured in {total:.1f} s")
+        watch.redraw()
+        return {"FINISHED"}
+
+
+class FMQM_OT_cancel(bpy.types.Operator):  # noqa: N801
+    bl_idname = "fmqm.cancel"
+    bl_label = "Cancel"
+    bl_description = "Stop the measurement; earlier results stay"
+    bl_options: ClassVar = {"INTERNAL"}  # no UNDO: it changes nothing in the file
+
+    @classmethod
+    def poll(cls, _: bpy.types.Context) -> bool:
+        return session.job is not None
+
+    def execute(self, _: bpy.types.Context) -> set[str]:
+        if session.job is not None:
+            session.job.cancelled = True
+        return {"FINISHED"}
+
+
+def _row_key(row: FMQMRow) -> tuple[Target, Target]:
+    return watch.row_targets(row)
+
+
+def _write_row(fmqm: FMQMScene, outcome: Outcome, settings_text: str) -> None:
+    """Replaces the row of the same two assets, or adds one."""
+    key = (outcome.reference_target, outcome.target)
+    row = next((row for row in fmqm.rows if _row_key(row) == key), None) or fmqm.rows.add()
+    session.drop(row.uid)
+    row.uid = uuid.uuid4().hex
+    row.name, row.kind = outcome.target.name, outcome.target.kind
+    row.reference_name, row.reference_kind = outcome.reference_target.name, outcome.reference_target.kind
+    row.bare_reference = outcome.reference_target.bare
+    row.error = outcome.error or ""
+    row.settings = settings_text
+    row.warnings = "\n".join(outcome.warnings)
+    row.fingerprint = " ".join(outcome.fingerprint)
+    row.seconds = outcome.seconds.get("total", 0.0)
+    row.stages = json.dumps(outcome.seconds)
+    row.triangles = outcome.triangles
+    row.share = 100 * outcome.triangles / outcome.reference_triangles if outcome.reference_triangles else 0.0
+    comparison, placement = outcome.comparison, outcome.placement
+    row.space = "" if placement is None else placement.label
+    row.scores = "" if comparison is None else numbers_text(comparison.scores)
+    row.stderr = "" if comparison is None or comparison.stderr is None else numbers_text(comparison.stderr)
+    row.patches = 0 if comparison is None else len(comparison.result.patches)
+    row.samples = 0 if comparison is None else len(comparison.result.samples.positions)
+    if comparison is not None and placement is not None and outcome.reference is not None:
+        session.put(
+            row.uid,
+            session.Measured(
+                reference=outcome.reference,
+                comparison=comparison,
+                reference_to_world=np.eye(4),  # it is measured where it stands
+                distorted_to_world=placement.to_world,
+            ),
+        )
+
+
+def _choose_row(fmqm: FMQMScene, outcome: Outcome) -> None:
+    key = (outcome.reference_target, outcome.target)
+    fmqm.row_index = next((index for index, row in enumerate(fmqm.rows) if _row_key(row) == key), 0)
+
+
+class FMQM_OT_preset_add(AddPresetBase, bpy.types.Operator):  # noqa: N801
+    bl_idname = "fmqm.preset_add"
+    bl_label = "Add Measuring Preset"
+    bl_description = "Save these settings as a preset, or remove the chosen one"
+    bl_options: ClassVar = {"INTERNAL"}
+    preset_menu = "FMQM_PT_presets"
+    preset_defines: ClassVar = ["settings = bpy.context.scene.fmqm.settings"]
+    preset_values: ClassVar = [f"settings.{name}" for name in PRESET_PROPERTIES]
+    preset_subdir = "fmqm"
+
+
+def _draw_in_object_menu(self: bpy.types.Menu, _: bpy.types.Context) -> None:
+    self.layout.separator()
+    self.layout.operator_context = "INVOKE_DEFAULT"
+    self.layout.operator(FMQM_OT_measure.bl_idname, text="Measure Quality (FMQM)")
+
+
+CLASSES = (FMQM_OT_measure, FMQM_OT_cancel, FMQM_OT_preset_add)
+
+
+def register() -> None:
+    bpy.types.VIEW3D_MT_object.append(_draw_in_object_menu)
+
+
+def unregister() -> None:
+    bpy.types.VIEW3D_MT_object.remove(_draw_in_object_menu)

@@ -1,0 +1,239 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Buttons of the results: sort, remove, copy, save."""
+
+from __future__ import annotations
+
+import json
+import os
+from typing import ClassVar
+
+import bpy
+import numpy as np
+from bpy.props import EnumProperty, StringProperty
+
+from .. import VERSION
+from ..metric.errors import FMQMError
+from ..metric.score import COLUMNS
+from ..report.fields import save_fields
+from ..report.files import write_text
+from ..report.pair import SHOWN, PairScore, csv_text, json_text, table_text
+from . import session, watch
+from .properties import FMQMRow, row_scores, row_stderr
+from .scene import FMQMScene
+
+# What an artist should know of each number: label, and what a low value looks like.
+EXPLAINED = {
+    "FMQM": ("FMQM", "The whole score, 0 to 1: mean over all patches. 1 is the same as the reference"),
+    "geoSSIM": (
+        "Shape",
+        "geoSSIM: distances to the surface. Low where the surface has moved, shrunk or lost its bumps",
+    ),
+    "geoGraSSIM": (
+        "Direction",
+        "geoGraSSIM: directions to the surface. Low where it is bent or faceted, so that its normals point elsewhere",
+    ),
+    "colorSSIM": (
+        "Color",
+        "colorSSIM: colors around a point. Low where the texture is blurred, shifted, tinted or compressed",
+    ),
+    "colorGraSSIM": (
+        "Color Edges",
+        "colorGraSSIM: the steepest color changes. Low where edges in the texture have moved, softened or broken up",
+    ),
+}
+assert set(EXPLAINED) == set(SHOWN)
+
+
+def active_row(fmqm: FMQMScene) -> FMQMRow | None:
+    """The chosen row of the results."""
+    return fmqm.rows[fmqm.row_index] if 0 <= fmqm.row_index < len(fmqm.rows) else None
+
+
+def pair_of(row: FMQMRow) -> PairScore:
+    """A row as the reports want it."""
+    scores, stderr = row_scores(row), row_stderr(row)
+    reference, target = watch.row_targets(row)
+    return PairScore(
+        reference=reference.label,
+        distorted=target.label,
+        scores=None if scores is None else np.array([scores[name] for name in COLUMNS]),
+        stderr=None if stderr is None else np.array([stderr[name] for name in COLUMNS]),
+        patches=row.patches or None,
+        samples=row.samples or None,
+        seconds=json.loads(row.stages or "{}"),
+        warnings=tuple(row.warnings.splitlines()),
+        error=row.error or None,
+        space=row.space or None,
+    )
+
+
+def _has_rows(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    if not context.scene.fmqm.rows:
+        cls.poll_message_set("Nothing has been measured yet")
+        return False
+    return True
+
+
+class FMQM_OT_sort_rows(bpy.types.Operator):  # noqa: N801
+    bl_idname = "fmqm.sort_rows"
+    bl_label = "Sort by Score"
+    bl_options: ClassVar = {"REGISTER", "UNDO"}
+
+    column: EnumProperty(
+        name="Column",
+        description="Number to sort by",
+        items=[(name, label, text) for name, (label, text) in EXPLAINED.items()],
+    )
+
+    @classmethod
+    def description(cls, _: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
+        return f"{EXPLAINED[properties.column][1]}.\nClick to sort the results by it, again for the other direction"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _has_rows(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        fmqm = context.scene.fmqm
+        chosen = active_row(fmqm)
+        chosen_uid = chosen.uid if chosen else ""
+        values = {row.uid: scores[self.column] for row in fmqm.rows if (scores := row_scores(row)) is not None}
+        now = list(values)
+        order = sorted(now, key=values.__getitem__, reverse=True)
+        if order == now:
+            order.reverse()
+        order += [row.uid for row in fmqm.rows if row.uid not in values]
+        for place, uid in enumerate(order):
+            fmqm.rows.move(next(i for i, row in enumerate(fmqm.rows) if row.uid == uid), place)
+        fmqm.row_index = next((i for i, row in enumerate(fmqm.rows) if row.uid == chosen_uid), 0)
+        return {"FINISHED"}
+
+
+class FMQM_OT_remove_row(bpy.types.Operator):  # noqa: N801
+    bl_idname = "fmqm.remove_row"
+    bl_label = "Remove Result"
+    bl_description = "Remove the chosen row from the results"
+    bl_options: ClassVar = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _has_rows(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        fmqm = context.scene.fmqm
+        fmqm.rows.remove(fmqm.row_index)
+        fmqm.row_index = max(0, min(fmqm.row_index, len(fmqm.rows) - 1))
+        return {"FINISHED"}
+
+
+class FMQM_OT_clear_results(bpy.types.Operator):  # noqa: N801
+    bl_idname = "fmqm.clear_results"
+    bl_label = "Clear Results"
+    bl_description = "Remove all rows of the results"
+    bl_options: ClassVar = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _has_rows(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        # The fields stay in the session's memory: undo brings the rows back.
+        context.scene.fmqm.rows.clear()
+        context.scene.fmqm.row_index = 0
+        return {"FINISHED"}
+
+
+class FMQM_OT_copy_results(bpy.types.Operator):  # noqa: N801
+    bl_idname = "fmqm.copy_results"
+    bl_label = "Copy as Text"
+    bl_description = "Copy the results to the clipboard as a table"
+    bl_options: ClassVar = {"INTERNAL"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _has_rows(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        context.window_manager.clipboard = table_text([pair_of(row) for row in context.scene.fmqm.rows])
+        self.report({"INFO"}, f"{len(context.scene.fmqm.rows)} results copied")
+        return {"FINISHED"}
+
+
+class FMQM_OT_save_results(bpy.types.Operator):  # noqa: N801
+    bl_idname = "fmqm.save_results"
+    bl_label = "Save Results"
+    bl_options: ClassVar = {"INTERNAL"}  # writes a file, changes nothing in the scene
+
+    file_format: EnumProperty(
+        name="Format",
+        description="What is saved",
+        items=[
+            ("json", "JSON", "Scores in full precision, with settings, times and warnings"),
+            ("csv", "CSV", "One row per result, for spreadsheets"),
+            ("npz", "NPZ", "Samples, fields and patch scores of the chosen result, for numpy"),
+        ],
+    )
+    filepath: StringProperty(name="File Path", description="File to write", subtype="FILE_PATH")
+    filter_glob: StringProperty(name="Filter", description="Files that are shown", options={"HIDDEN"})
+    check_existing: bpy.props.BoolProperty(
+        name="Check Existing", description="Warn before a file is overwritten", default=True, options={"HIDDEN"}
+    )
+
+    @classmethod
+    def description(cls, _: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
+        return str(properties.bl_rna.properties["file_format"].enum_items[properties.file_format].description)
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _has_rows(cls, context)
+
+    def invoke(self, context: bpy.types.Context, _: bpy.types.Event) -> set[str]:
+        folder = os.path.dirname(bpy.data.filepath) or os.path.expanduser("~")
+        self.filepath = os.path.join(folder, f"fmqm.{self.file_format}")
+        self.filter_glob = f"*.{self.file_format}"
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def check(self, _: bpy.types.Context) -> bool:
+        wanted = self._with_suffix()
+        changed = wanted != self.filepath
+        self.filepath = wanted
+        return changed
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        fmqm = context.scene.fmqm
+        row = active_row(fmqm) or fmqm.rows[0]
+        path = bpy.path.abspath(self._with_suffix())
+        # One file tells of one set of settings: scores at others do not compare.
+        rows = [other for other in fmqm.rows if other.settings == row.settings]
+        try:
+            if self.file_format == "npz":
+                measured = session.get(row.uid)
+                if measured is None:
+                    raise FMQMError(f"{row.name}: the samples are not in memory any more; measure again")
+                save_fields(path, measured.comparison.result)
+            elif self.file_format == "csv":
+                write_text(path, csv_text([pair_of(other) for other in rows]))
+            else:
+                versions = {"fmqm_version": VERSION, "blender_version": bpy.app.version_string}
+                write_text(path, json_text([pair_of(other) for other in rows], json.loads(row.settings), versions))
+        except FMQMError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        left_out = len(fmqm.rows) - len(rows)
+        tail = f"; {left_out} measured with other settings left out" if left_out and self.file_format != "npz" else ""
+        self.report({"INFO"}, f"Saved {os.path.basename(path)}{tail}")
+        return {"FINISHED"}
+
+    def _with_suffix(self) -> str:
+        suffix = f".{self.file_format}"
+        return self.filepath if self.filepath.lower().endswith(suffix) else self.filepath + suffix
+
+
+CLASSES = (
+    FMQM_OT_sort_rows,
+    FMQM_OT_remove_row,
+    FMQM_OT_clear_results,
+    FMQM_OT_copy_results,
+    FMQM_OT_save_results,
+)
