@@ -5,14 +5,15 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..metric.color import Color, Extension, PlainColor, Texture, encode_srgb
+from ..metric.color import Color, Extension, Material, PlainColor, Texture, encode_srgb
 from ..metric.errors import FileError, MeshError
+from .headers import Limits
 
 DEFAULT_GREY = 0.8  # linear base color that Blender gives a surface without a material
 _EXTENSIONS: dict[str, Extension] = {"REPEAT": "repeat", "EXTEND": "extend", "CLIP": "clip", "MIRROR": "mirror"}
@@ -33,17 +34,91 @@ class SlotColor:
     warnings: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True)
+class Reading:
+    """How an asset's looks are read.
+
+    Attributes:
+        texture: replaces everything that the materials say.
+        bake: side of baked images in pixels; 0 forbids baking.
+        stand_in: a missing base-color image is shown in magenta, as Cycles shows it, instead of being an error.
+        limits: of the images.
+    """
+
+    texture: Texture | None = None
+    bake: int = 1024
+    stand_in: bool = False
+    limits: Limits = Limits()
+
+
+@dataclass(frozen=True)
+class Layer:
+    """What a material wants of a mesh: a UV map (2 channels of MeshArrays.corners) or a color attribute (4, linear
+    RGBA). The name "" is the mesh's one that is active for rendering."""
+
+    kind: Literal["uv", "color"]
+    name: str
+
+
+@dataclass(frozen=True)
+class Look:
+    """A material that was read.
+
+    Attributes:
+        material: its samplers read the channels of MeshArrays.corners, layer after layer in the order of layers.
+        layers: what the mesh must offer.
+        warnings: what was assumed; they name the material.
+    """
+
+    material: Material
+    layers: tuple[Layer, ...]
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Unread:
+    """A material that must be baked: the node that is not read, and why."""
+
+    node: str
+    why: str
+
+
 class TextureCache:
     """Pixels of images, read once for all the slots and objects of an asset."""
 
     def __init__(self) -> None:
         self._pixels: dict[int, NDArray[np.uint8] | NDArray[np.float32]] = {}
+        self.looks: dict[int, Look | Unread] = {}
 
     def pixels(self, image: bpy.types.Image) -> NDArray[np.uint8] | NDArray[np.float32]:
         key = image.as_pointer()
         if key not in self._pixels:
             self._pixels[key] = read_pixels(image)
         return self._pixels[key]
+
+
+def read_look(material: bpy.types.Material | None, cache: TextureCache, reading: Reading) -> Look | Unread:
+    """The look of a material; the same object for the same material of a cache.
+
+    Raises:
+        MeshError: a base-color image cannot be read and reading.stand_in is off, or an image exceeds the limits.
+    """
+    key = 0 if material is None else material.original.as_pointer()
+    if key not in cache.looks:
+        if reading.texture is not None:
+            name = "" if material is None else material.name
+            cache.looks[key] = Look(Material(name, reading.texture, how="given"), (Layer("uv", ""),))
+        else:
+            seen = slot_color(material, cache, "asset")
+            layers = () if seen.uv_map is None else (Layer("uv", seen.uv_map),)
+            name = "" if material is None else material.name
+            cache.looks[key] = Look(Material(name, seen.color), layers, seen.warnings)
+    return cache.looks[key]
+
+
+def plain_look(material: bpy.types.Material, warning: str) -> Look:
+    """The plain color of a material that cannot be read where baking is forbidden."""
+    return Look(Material(material.name, _plain(material.diffuse_color[:3]), how="plain"), (), (warning,))
 
 
 def slot_color(material: bpy.types.Material | None, cache: TextureCache, owner: str) -> SlotColor:

@@ -36,6 +36,32 @@ class Alpha(Protocol):
         """(N,) float64 in [0, 1] for (N, K) interpolated values."""
 
 
+How = Literal["read", "baked", "plain", "given", "none"]
+
+
+@dataclass(frozen=True)
+class ImageFacts:
+    """An image that a material uses, whether the metric sees it or not.
+
+    Attributes:
+        role: "base color", "alpha", or the shader's input that it feeds ("Normal", "Roughness").
+        name, path: as Blender has them; the path is "" for images that were made in Blender.
+        width, height: pixels; 0 where unknown.
+        color_space: Blender's name of it.
+        missing: neither its file nor its data are there.
+        digest: the same for the same content; "" where missing.
+    """
+
+    role: str
+    name: str
+    path: str
+    width: int
+    height: int
+    color_space: str
+    missing: bool
+    digest: str
+
+
 @dataclass(frozen=True)
 class Material:
     """What triangles look like.
@@ -43,11 +69,16 @@ class Material:
     Attributes:
         name: for messages and reports.
         color, alpha: at a place; None is opaque everywhere.
+        how: where the color is from: its nodes were read or baked, only a plain color was taken, a texture was
+            given for the whole asset, or there is no material.
+        images: what it uses.
     """
 
     name: str
     color: Color
     alpha: Alpha | None = None
+    how: How = "read"
+    images: tuple[ImageFacts, ...] = ()
 
 
 @dataclass(frozen=True)
