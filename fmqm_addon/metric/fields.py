@@ -94,7 +94,7 @@ def _nearest_triangles(
                 bounds = np.full(len(batch), np.inf)
             else:
                 guide = triangle[guides[first : first + _BATCH]]
-                bounds = np.linalg.norm(points[batch] - _closest(surface, points[batch], guide)[0], axis=1)
+                bounds = np.linalg.norm(points[batch] - closest_on(surface, points[batch], guide)[0], axis=1)
             triangle[batch] = surface.query.nearest(points[batch], bounds * (1 + BOUND_SLACK) + BOUND_MARGIN)
             looked_up += len(batch)
             yield 0.35 * looked_up / len(points)
@@ -132,7 +132,7 @@ def _settled(surface: Surface, points: Floats, triangle: Ints) -> tuple[Ints, Fl
     are equally near, but across a UV seam their colors differ: which one a tree happens to find first, in
     the order of a file, must not decide. (The paper has no rule for ties.)
     """
-    nearest, weights = _closest(surface, points, triangle)
+    nearest, weights = closest_on(surface, points, triangle)
     rows = np.flatnonzero((weights[:, 0] == 0) | (weights[:, 1] == 0) | (weights[:, 2] == 0))
     if not rows.size:
         return triangle, nearest, weights
@@ -149,7 +149,7 @@ def _settled(surface: Surface, points: Floats, triangle: Ints) -> tuple[Ints, Fl
     with_both = (a == second[row]) | (b == second[row]) | (c == second[row])
     row, face = row[with_both], face[with_both]
 
-    candidates, candidate_weights = _closest(surface, points[rows[row]], face)
+    candidates, candidate_weights = closest_on(surface, points[rows[row]], face)
     away = points[rows[row]] - candidates
     distance = np.sqrt(dot(away, away))
     facing = np.abs(dot(away, triangle_normals(surface.vertices, surface.triangles[face])))
@@ -195,7 +195,8 @@ def _guide(order: Ints, index: int) -> Ints:
     return order[place[now] // before * before]
 
 
-def _closest(surface: Surface, points: Floats, triangle: Ints) -> tuple[Floats, Floats]:
+def closest_on(surface: Surface, points: Floats, triangle: Ints) -> tuple[Floats, Floats]:
+    """Closest points to (N, 3) points on (N,) triangles of a surface, and their barycentric weights, both (N, 3)."""
     corners = surface.triangles.take(triangle, axis=0)
     a, b, c = (surface.vertices.take(corners[:, k], axis=0) for k in range(3))
     return closest_on_triangles(points, a, b, c)

@@ -105,6 +105,22 @@ QueryBuilder = Callable[[Floats, Ints], SurfaceQuery]
 
 
 @dataclass(frozen=True)
+class Preparation:
+    """What preparing a surface did.
+
+    Attributes:
+        given: triangles of the mesh. not_finite, flat, repeated: of these left out, by reason, in this order.
+        welded: vertices that became one with another at the same position.
+    """
+
+    given: int
+    not_finite: int
+    flat: int
+    repeated: int
+    welded: int
+
+
+@dataclass(frozen=True)
 class Surface:
     """A prepared surface (METRIC "Preparing the two surfaces").
 
@@ -113,6 +129,7 @@ class Surface:
         triangles: (T, 3) int64; none is degenerate, none repeats another.
         corners: (T, 3, K) float64, finite; material: (T,) int64; materials: as in MeshArrays.
         source: (T,) int64, the row of each triangle in MeshArrays.
+        preparation: what was left out and welded.
     """
 
     name: str
@@ -124,6 +141,7 @@ class Surface:
     materials: tuple[Material, ...]
     source: Ints
     query: SurfaceQuery
+    preparation: Preparation
     warnings: tuple[str, ...]
 
     def color_at(self, triangle: Ints, barycentric: Floats) -> Floats:
@@ -190,30 +208,34 @@ def preparing_surface(
         raise MeshError(f"{mesh.name}: the mesh has no faces; a surface is wanted")
     source = np.arange(len(triangles))
 
-    def keep(mask: NDArray[np.bool_], why: str) -> None:
+    def keep(mask: NDArray[np.bool_], why: str) -> int:
+        """Leaves out the others; returns how many they are."""
         nonlocal triangles, source
-        dropped = len(mask) - np.count_nonzero(mask)
+        dropped = len(mask) - int(np.count_nonzero(mask))
         if not dropped:
-            return
+            return 0
         if dropped == len(mask):
             raise MeshError(f"{mesh.name}: all {len(mesh.triangles)} triangles are unusable; the last {dropped} {why}")
         warnings.append(f"{mesh.name}: {dropped} of {len(mesh.triangles)} triangles left out: they {why}")
         triangles, source = triangles[mask], source[mask]
+        return dropped
 
+    not_finite = 0
     world = np.asarray(mesh.positions, np.float64)
     if not np.isfinite(world).all():
         finite = np.isfinite(world).all(axis=1)
-        keep(finite[triangles].all(axis=1), "have coordinates that are not finite")
+        not_finite = keep(finite[triangles].all(axis=1), "have coordinates that are not finite")
     yield 0.1
     world, triangles = _used_only(world, triangles)
     if frame is None:
         frame = _frame_of(world, mesh.name)
     yield 0.2
     positions, triangles = weld(frame.enter(world), triangles)
+    welded = len(world) - len(positions)
     yield 0.4
-    keep(~_is_flat(positions, triangles, frame), "have zero area")
+    flat = keep(~_is_flat(positions, triangles, frame), "have zero area")
     yield 0.5
-    keep(_is_first(triangles), "repeat another triangle")
+    repeated = keep(_is_first(triangles), "repeat another triangle")
     yield 0.6
     vertices, triangles = _used_only(positions, triangles)
 
@@ -233,6 +255,7 @@ def preparing_surface(
         materials=mesh.materials,
         source=source,
         query=build_query(vertices, triangles),
+        preparation=Preparation(len(mesh.triangles), not_finite, flat, repeated, welded),
         warnings=tuple(warnings),
     )
 
