@@ -72,6 +72,7 @@ class Material:
         how: where the color is from: its nodes were read or baked, only a plain color was taken, a texture was
             given for the whole asset, or there is no material.
         images: what it uses.
+        uv: the first of the two channels of corners that hold texture coordinates; None: it has none. For reports.
     """
 
     name: str
@@ -79,6 +80,7 @@ class Material:
     alpha: Alpha | None = None
     how: How = "read"
     images: tuple[ImageFacts, ...] = ()
+    uv: int | None = None
 
 
 @dataclass(frozen=True)
