@@ -1,0 +1,268 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What numpy cannot read of materials, drawn by Cycles: base color and opacity, on an image for each material."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..metric.color import Material, Texture, encode_srgb
+from ..metric.errors import MeshError
+from ..metric.spatial import Floats
+from ..metric.surface import triangle_areas
+from .emission import Shine, shining
+from .layout import Layout, new_layout, own_layout
+from .material import Layer, Look
+
+_MARGIN = 8  # pixels around the parts of an own UV map, for bilinear lookups at their edges
+_OPAQUE = 254.5 / 255
+_VALUES = {  # how the values of an attribute are called, and their number, by data type
+    "FLOAT": ("value", 1, np.float32),
+    "INT": ("value", 1, np.int32),
+    "BOOLEAN": ("value", 1, np.bool_),
+    "INT8": ("value", 1, np.int32),
+    "FLOAT2": ("vector", 2, np.float32),
+    "FLOAT_VECTOR": ("vector", 3, np.float32),
+    "FLOAT_COLOR": ("color", 4, np.float32),
+    "BYTE_COLOR": ("color", 4, np.float32),
+}
+
+
+@dataclass(frozen=True)
+class Baked:
+    """A baked material slot.
+
+    Attributes:
+        look: reads its two channels from corners.
+        corners: (T, 3, 2) float32, for the slot's triangles in the order of Mesh.loop_triangles.
+    """
+
+    look: Look
+    corners: NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class _Part:
+    """The triangles of one slot: rows of loop_triangles, their places on an image, and that image."""
+
+    slot: int
+    rows: NDArray[np.int64]
+    layout: Layout
+    image: bpy.types.Image
+
+
+def bake_slots(
+    object_: bpy.types.Object,
+    depsgraph: bpy.types.Depsgraph,
+    slots: Mapping[int, bpy.types.Material],
+    size: int,
+    owner: str,
+) -> dict[int, Baked]:
+    """Bakes materials of one evaluated object with Cycles on the CPU; nothing stays in bpy.data.
+
+    Args:
+        object_: evaluated; its mesh is the one that to_mesh(preserve_all_data_layers=True, depsgraph) gives.
+        slots: by Polygon.material_index; slots without faces have no result.
+        size: side of the images in pixels; becomes a power of two, and larger if the faces need it.
+        owner: what messages call the object.
+
+    Raises:
+        MeshError: this Blender has no Cycles, or it fails, or there are too many faces.
+    """
+    names = ", ".join(dict.fromkeys(material.name for material in slots.values()))
+    try:
+        with ExitStack() as temporary:
+            return _bake(object_, depsgraph, slots, size, temporary)
+    except (MeshError, RuntimeError, TypeError) as error:
+        why = (str(error).strip() or type(error).__name__).splitlines()[-1].removeprefix("Error: ")
+        raise MeshError(f"{owner}: material {names} cannot be baked ({why}); bake 0 takes its plain color") from error
+
+
+def _bake(
+    object_: bpy.types.Object,
+    depsgraph: bpy.types.Depsgraph,
+    slots: Mapping[int, bpy.types.Material],
+    size: int,
+    temporary: ExitStack,
+) -> dict[int, Baked]:
+    scene = _scene(depsgraph.scene, temporary)
+    source = bpy.data.meshes.new_from_object(object_, preserve_all_data_layers=True, depsgraph=depsgraph)
+    temporary.callback(bpy.data.meshes.remove, source)
+    vertices = np.nan_to_num(_values(source.attributes["position"]).astype(np.float64), posinf=0, neginf=0)
+    parts = []
+    slot = _read(source.polygons, "material_index", 1, np.int32).ravel()[_polygons(source)]
+    for index in slots:
+        rows = np.flatnonzero(slot == index)
+        if rows.size:
+            layout = _layout(source, vertices, np.array(object_.matrix_world, np.float64), rows, size)
+            image = bpy.data.images.new("FMQM bake", layout.side, layout.side, float_buffer=True, is_data=True)
+            temporary.callback(bpy.data.images.remove, image)
+            parts.append(_Part(index, rows, layout, image))
+    if not parts:
+        return {}
+
+    mesh, uv_map = _triangles(source, parts, temporary)
+    stand_in = bpy.data.objects.new("FMQM bake", mesh)
+    temporary.callback(bpy.data.objects.remove, stand_in)
+    stand_in.matrix_world = object_.matrix_world
+    stand_in.color, stand_in.pass_index = object_.color, object_.pass_index
+    scene.collection.objects.link(stand_in)
+
+    drawn = {}
+    for shine in Shine:
+        mesh.materials.clear()
+        for part in parts:
+            material = shining(slots[part.slot].original, shine, temporary)
+            target = material.node_tree.nodes.new("ShaderNodeTexImage")
+            target.image = part.image
+            material.node_tree.nodes.active = target
+            mesh.materials.append(material)
+        _run(scene, stand_in, uv_map)
+        drawn[shine] = [_pixels(part.image) for part in parts]
+    return {
+        part.slot: Baked(_look(slots[part.slot].name, part.layout, color, weight), part.layout.corners)
+        for part, color, weight in zip(parts, drawn[Shine.COLOR], drawn[Shine.WEIGHT], strict=True)
+    }
+
+
+def _scene(like: bpy.types.Scene, temporary: ExitStack) -> bpy.types.Scene:
+    scene = bpy.data.scenes.new("FMQM bake")
+    temporary.callback(bpy.data.scenes.remove, scene)
+    try:
+        scene.render.engine = "CYCLES"
+    except TypeError as error:
+        raise MeshError("this Blender has no Cycles") from error
+    scene.frame_set(like.frame_current, subframe=like.frame_subframe)
+    # The one sample of a pixel lies in its middle.
+    scene.cycles.device, scene.cycles.samples, scene.cycles.max_bounces = "CPU", 1, 0
+    scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False
+    return scene
+
+
+def _run(scene: bpy.types.Scene, object_: bpy.types.Object, uv_map: str) -> None:
+    view_layer = scene.view_layers[0]
+    view_layer.objects.active = object_
+    object_.select_set(True, view_layer=view_layer)
+    view_layer.update()
+    with bpy.context.temp_override(
+        scene=scene,
+        view_layer=view_layer,
+        object=object_,
+        active_object=object_,
+        selected_objects=[object_],
+        selected_editable_objects=[object_],
+    ):
+        done = bpy.ops.object.bake(
+            type="EMIT", target="IMAGE_TEXTURES", save_mode="INTERNAL", use_clear=True, use_selected_to_active=False,
+            margin=_MARGIN, margin_type="EXTEND", uv_layer=uv_map,
+        )  # fmt: skip
+    if "FINISHED" not in done:
+        raise MeshError("Cycles did not finish")
+
+
+def _look(name: str, layout: Layout, drawn: NDArray[np.float32], weights: NDArray[np.float32]) -> Look:
+    """Divides the transparent out, and encodes.
+
+    Args:
+        drawn, weights: (H, W, 3), row 0 at v = 0; see emission.Shine.
+    """
+    opaque = np.minimum(weights[:, :, :1], 1)  # more than 1 where shaders are added
+    color = encode_srgb(np.divide(drawn, opaque, out=np.zeros_like(drawn), where=opaque > 0))
+    layout.fill(color)
+    texture = Texture(_bytes(color), extension="extend")
+    warning = f"material {name}: baked at {layout.side} x {layout.side}"
+    return Look(Material(name, texture, how="baked"), (Layer("uv", ""),), (warning,))
+
+
+def _bytes(values: NDArray[Any]) -> NDArray[np.uint8]:
+    """(H, W, C) values in [0, 1] as bytes, row 0 at the top."""
+    return np.ascontiguousarray((np.clip(values, 0, 1) * 255 + 0.5).astype(np.uint8)[::-1])
+
+
+def _layout(mesh: bpy.types.Mesh, vertices: Floats, matrix: Floats, rows: NDArray[np.int64], size: int) -> Layout:
+    """Places of the triangles in rows of loop_triangles."""
+    world = vertices @ matrix[:3, :3].T
+    triangles, loops = _loop_triangles(mesh, "vertices")[rows], _loop_triangles(mesh, "loops")[rows]
+    active = next((layer for layer in mesh.uv_layers if layer.active_render), None)
+    if active is not None:
+        uv = _values(mesh.attributes[active.name])[loops]
+        own = own_layout(uv, triangle_areas(world, triangles), size)
+        if own is not None:
+            return own
+    polygon = _polygons(mesh)[rows]
+    first = _read(mesh.polygons, "loop_start", 1, np.int32).ravel()[polygon]
+    total = _read(mesh.polygons, "loop_total", 1, np.int32).ravel()[polygon]
+    return new_layout(world, triangles, loops - first[:, None], np.where(total == 4, polygon, -1), size)
+
+
+def _triangles(source: bpy.types.Mesh, parts: list[_Part], temporary: ExitStack) -> tuple[bpy.types.Mesh, str]:
+    """The parts' triangles as faces of a new mesh, with all that shaders may ask of the source; the name of the
+    UV map that the baker draws by. Part i has material i."""
+    rows = np.concatenate([part.rows for part in parts])
+    triangles, loops = _loop_triangles(source, "vertices")[rows], _loop_triangles(source, "loops")[rows].ravel()
+    kept = {"POINT": slice(None), "CORNER": loops, "FACE": _polygons(source)[rows]}
+
+    mesh = bpy.data.meshes.new("FMQM bake")
+    temporary.callback(bpy.data.meshes.remove, mesh)
+    mesh.vertices.add(len(source.vertices))
+    mesh.loops.add(triangles.size)
+    mesh.attributes[".corner_vert"].data.foreach_set("value", triangles.ravel())
+    mesh.polygons.add(len(triangles))
+    mesh.polygons.foreach_set("loop_start", np.arange(0, triangles.size, 3, dtype=np.int32))
+    for attribute in source.attributes:
+        if attribute.name[0] != "." and attribute.domain in kept and attribute.data_type in _VALUES:
+            _store(
+                mesh, attribute.name, attribute.data_type, attribute.domain, _values(attribute)[kept[attribute.domain]]
+            )
+    normals = _read(source.corner_normals, "vector", 3, np.float32)[loops]
+    _store(mesh, "custom_normal", "FLOAT_VECTOR", "CORNER", normals)
+    _store(mesh, "material_index", "INT", "FACE", np.repeat(np.arange(len(parts)), [len(part.rows) for part in parts]))
+    for layer in source.uv_layers:
+        mesh.uv_layers[layer.name].active_render = layer.active_render
+    mesh.attributes.default_color_name = source.attributes.default_color_name
+    mesh.use_auto_texspace = False
+    mesh.texspace_location, mesh.texspace_size = source.texspace_location, source.texspace_size
+    target = mesh.attributes.new("FMQM bake", "FLOAT2", "CORNER")
+    target.data.foreach_set("vector", np.concatenate([part.layout.drawn for part in parts]).ravel())
+    name = target.name
+    mesh.update(calc_edges=True)
+    return mesh, name
+
+
+def _store(mesh: bpy.types.Mesh, name: str, data_type: str, domain: str, values: NDArray[Any]) -> None:
+    attribute = mesh.attributes.get(name) or mesh.attributes.new(name, data_type, domain)
+    attribute.data.foreach_set(_VALUES[data_type][0], np.ascontiguousarray(values).ravel())
+
+
+def _values(attribute: bpy.types.Attribute) -> NDArray[Any]:
+    """(N, channels)"""
+    return _read(attribute.data, *_VALUES[attribute.data_type])
+
+
+def _polygons(mesh: bpy.types.Mesh) -> NDArray[Any]:
+    return _read(mesh.loop_triangles, "polygon_index", 1, np.int32).ravel()
+
+
+def _loop_triangles(mesh: bpy.types.Mesh, what: str) -> NDArray[Any]:
+    return _read(mesh.loop_triangles, what, 3, np.int32)
+
+
+def _pixels(image: bpy.types.Image) -> NDArray[np.float32]:
+    """(H, W, 3) linear, row 0 at v = 0; what is not a number is 0."""
+    width, height = image.size
+    values = np.empty(width * height * 4, np.float32)
+    image.pixels.foreach_get(values)
+    return np.nan_to_num(values.reshape(height, width, 4)[:, :, :3])
+
+
+def _read(collection: Any, name: str, channels: int, dtype: type) -> NDArray[Any]:
+    """(N, channels) of a collection of Blender's."""
+    values: NDArray[Any] = np.empty((len(collection), channels), dtype)
+    collection.foreach_get(name, values.reshape(-1))
+    return values
