@@ -1,0 +1,302 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The cheapest version of an asset whose FMQM stays at or above a target, found by bisection, in steps.
+
+All versions are scored on the same samples of the same reference, so that their differences are the meshes' and not
+chance. Most are scored with few patches; the one that is chosen, and the next cheaper one, with all of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..metric.errors import FMQMError, MeshError
+from ..metric.score import COLUMNS, Progress, Stepper, Work
+from ..metric.settings import FAST_SCORED_PATCHES, Settings
+from ..metric.surface import MeshArrays
+from .measure import Measurement
+from .snapshot import placed
+
+TOLERANCE = 0.01  # neighboring versions differ by this share of their triangles
+LEAST_TRIANGLES = 4  # a tetrahedron
+WELD, DECIMATE = "FMQM Weld", "FMQM Decimate"  # the modifiers' names
+WELD_DISTANCE = 1e-6  # of the object's extent: float32 apart. With 0 the modifier merges nothing
+
+_FMQM = COLUMNS.index("FMQM")
+_PREPARED = 0.1  # share of the progress
+_PER_STEP = 0.1  # of the rest: how many steps there will be is not known
+
+
+@dataclass(frozen=True)
+class Version:
+    """What is made of the asset.
+
+    Attributes:
+        ratio: of the Decimate modifier (collapse), above 0; 1 leaves the triangles alone.
+        texture: longest side of its color images, in pixels; None leaves them alone.
+    """
+
+    ratio: float = 1.0
+    texture: int | None = None
+
+
+@dataclass(frozen=True)
+class Step:
+    """A version that was scored.
+
+    Attributes:
+        quick: with few patches; such scores only lead to those that count.
+        fmqm: in [0, 1]; None: nothing was left that could be measured.
+    """
+
+    version: Version
+    triangles: int
+    fmqm: float | None
+    quick: bool
+
+
+@dataclass(frozen=True)
+class Found:
+    """The outcome of a search.
+
+    Attributes:
+        reached: whether best is at or above the target; otherwise best is the dearest version that was allowed.
+        below: the next cheaper version, which misses the target; None: there is none.
+        path: every step that this search took, in order.
+    """
+
+    target: float
+    reached: bool
+    best: Step
+    below: Step | None
+    path: tuple[Step, ...]
+
+
+Reader = Callable[[Version], MeshArrays]
+
+
+class Search:
+    """An asset, prepared once, with the scores of its versions, for any number of targets.
+
+    Args:
+        read: the arrays of a version, always in the same frame; raises MeshError where nothing is left of it.
+        settings: that decide. While searching only FAST_SCORED_PATCHES of the patches are scored.
+    """
+
+    def __init__(self, read: Reader, settings: Settings) -> None:
+        few = replace(settings, scored_patches=min(settings.scored_patches or settings.patches, FAST_SCORED_PATCHES))
+        self._read = read
+        self._settings = {False: settings, True: few}
+        self._two_rounds = few.scored_patches != (settings.scored_patches or settings.patches)
+        self._measurements: dict[bool, Measurement] = {}
+        self._steps: dict[tuple[bool, Version], Step] = {}
+        self.triangles = 0  # of the asset as it is; after preparing
+
+    def prepare(self) -> Work[None]:
+        """Raises MeshError where the asset cannot be measured."""
+        yield Progress("Reading", 0.0)
+        asset = self._read(Version())
+        self.triangles = len(asset.triangles)
+        rounds = (True, False) if self._two_rounds else (False,)
+        for number, quick in enumerate(rounds):
+            measurement = Measurement(asset, self._settings[quick])
+            preparing = measurement.prepare()
+            while preparing.step():
+                yield Progress("Preparing", (number + preparing.progress.done) / len(rounds))
+            self._measurements[quick] = measurement
+
+    def ratios(self, max_triangles: int | None = None) -> list[Version]:
+        """Versions with fewer and fewer triangles: TOLERANCE apart, or one triangle where that is more.
+
+        Raises:
+            MeshError: max_triangles is below LEAST_TRIANGLES.
+        """
+        most = min(self.triangles, max_triangles or self.triangles)
+        if max_triangles is not None and max_triangles < LEAST_TRIANGLES:
+            raise MeshError(f"max-triangles is {max_triangles}; at least {LEAST_TRIANGLES} are wanted")
+        counts = [most]
+        while (fewer := min(counts[-1] - 1, round(counts[-1] * (1 - TOLERANCE)))) >= LEAST_TRIANGLES:
+            counts.append(fewer)
+        return [self._of_triangles(count) for count in counts]
+
+    def _of_triangles(self, count: int) -> Version:
+        # The modifier rounds down; half a triangle more keeps float32 from losing one.
+        return Version(1.0 if count == self.triangles else (count + 0.5) / self.triangles)
+
+    def find(self, target: float, versions: Sequence[Version]) -> Work[Found]:
+        """The last of versions, which get ever cheaper, that stays at or above the target; the next one does not.
+
+        FMQM falls about steadily with them, not strictly: a much cheaper one that happens to pass may be missed.
+        """
+        path: list[Step] = []
+
+        def scored(index: int, quick: bool) -> Work[bool]:
+            step = yield from self._scored(versions[index], quick, len(path))
+            if step not in path:
+                path.append(step)
+            return step.fmqm is not None and step.fmqm >= target
+
+        start, stride = len(versions) // 2, max(1, len(versions) // 4)
+        if self._two_rounds:
+            guess = yield from last_passing(len(versions), lambda index: scored(index, True), start, stride)
+            start, stride = max(guess, 0), 1
+        last = yield from last_passing(len(versions), lambda index: scored(index, False), start, stride)
+        steps = [self._steps.get((False, version)) for version in versions[max(last, 0) : max(last, 0) + 2]]
+        best, below = steps[0], steps[1] if last >= 0 and len(steps) > 1 else None
+        assert best is not None
+        return Found(target, last >= 0, best, below, tuple(path))
+
+    def _scored(self, version: Version, quick: bool, number: int) -> Work[Step]:
+        """Scores of earlier searches serve again."""
+        known = self._steps.get((quick, version))
+        if known is not None:
+            return known
+        done = 1 - (1 - _PER_STEP) ** number
+        what = f"{100 * version.ratio:.3g} % of the triangles"
+        if version.texture is not None:
+            what += f", textures of {version.texture}"
+        yield Progress(what, done)
+        triangles, fmqm = 0, None
+        try:
+            mesh = self._read(version)
+            triangles = len(mesh.triangles)
+            comparing = self._measurements[quick].compare(mesh)
+            while comparing.step():
+                yield Progress(what, done + (1 - done) * _PER_STEP * comparing.progress.done)
+            fmqm = float(comparing.result.scores[_FMQM])
+        except MeshError:
+            pass  # nothing is left of it: it misses any target
+        step = Step(version, triangles, fmqm, quick)
+        self._steps[quick, version] = step
+        return step
+
+
+def last_passing(
+    count: int, passes: Callable[[int], Generator[Progress, None, bool]], start: int, stride: int
+) -> Work[int]:
+    """The last of `count` indices that passes, next to one that does not; -1 where index 0 does not pass.
+
+    Goes from start in strides that double until it has passed and failed once, then halves what is between.
+    """
+    passed, failed, index = -1, count, start
+    while failed - passed > 1:
+        if (yield from passes(index)):
+            passed = index
+        else:
+            failed = index
+        if passed < 0:
+            index, stride = max(failed - stride, 0), 2 * stride
+        elif failed == count:
+            index, stride = min(passed + stride, count - 1), 2 * stride
+        else:
+            index = (passed + failed) // 2
+    return passed
+
+
+def decimating(
+    read: Reader, targets: Sequence[float], settings: Settings, max_triangles: int | None = None
+) -> Stepper[list[Found]]:
+    """For each target the version with the fewest triangles; textures are left alone."""
+    return Stepper(_decimating(read, targets, settings, max_triangles))
+
+
+def _decimating(
+    read: Reader, targets: Sequence[float], settings: Settings, max_triangles: int | None
+) -> Work[list[Found]]:
+    search = Search(read, settings)
+    yield from part(search.prepare(), 0.0, _PREPARED)
+    versions = search.ratios(max_triangles)
+    found = []
+    for number, target in enumerate(targets):
+        share = (1 - _PREPARED) / len(targets)
+        found.append((yield from part(search.find(target, versions), _PREPARED + share * number, share)))
+    return found
+
+
+def part(work: Work[Any], first: float, share: float) -> Work[Any]:
+    """Work as a part of larger work."""
+    while True:
+        try:
+            progress = next(work)
+        except StopIteration as end:
+            return end.value
+        yield Progress(progress.stage, first + share * progress.done)
+
+
+# --- Versions of objects ----------------------------------------------------------------------------------------------
+
+
+def scene_reader(names: Sequence[str], label: str) -> Reader:
+    """Reads objects of the open file, by name_full, decimated; nothing is left behind.
+
+    Raises, when it is called:
+        FMQMError: one of them is gone.
+        MeshError: no face is left of them.
+    """
+
+    def read(version: Version) -> MeshArrays:
+        by_name = {object_.name_full: object_ for object_ in bpy.data.objects}
+        gone = [name for name in names if name not in by_name]
+        if gone:
+            raise FMQMError(f"{gone[0]}: it is no longer in the file; choose another")
+        with _copies([by_name[name] for name in names]) as copies:
+            for copy in copies:
+                add_modifiers(copy, version.ratio)
+            return placed(copies, label).world()
+
+    return read
+
+
+def decimated_copy(object_: bpy.types.Object, ratio: float, name: str) -> bpy.types.Object:
+    """A copy beside the object, in its collections, on the same mesh, with the modifiers live."""
+    copy = object_.copy()
+    copy.name = name
+    for collection in object_.users_collection:
+        collection.objects.link(copy)
+    add_modifiers(copy, ratio)
+    return copy
+
+
+def add_modifiers(object_: bpy.types.Object, ratio: float) -> None:
+    """Decimate, after a Weld where vertices coincide: importers split them at seams, which collapsing would tear open.
+
+    Objects without a mesh of their own are left as they are.
+    """
+    if object_.type != "MESH" or ratio >= 1:
+        return
+    extent = _split_extent(object_.data)
+    if extent:
+        weld = object_.modifiers.new(WELD, "WELD")
+        weld.merge_threshold = WELD_DISTANCE * extent
+    decimate = object_.modifiers.new(DECIMATE, "DECIMATE")
+    decimate.ratio = ratio
+
+
+@contextmanager
+def _copies(objects: Sequence[bpy.types.Object]) -> Iterator[list[bpy.types.Object]]:
+    """Duplicates on the same meshes, in no scene."""
+    copies: list[bpy.types.Object] = []
+    try:
+        for object_ in objects:
+            if object_.mode == "EDIT":
+                object_.update_from_editmode()
+            copies.append(object_.copy())
+        yield copies
+    finally:
+        for copy in copies:
+            bpy.data.objects.remove(copy)
+
+
+def _split_extent(mesh: bpy.types.Mesh) -> float:
+    """The longest side of a mesh's box where some of its vertices coincide, else 0."""
+    positions: NDArray[np.float32] = np.empty((len(mesh.vertices), 3), np.float32)
+    mesh.vertices.foreach_get("co", positions.reshape(-1))
+    if not len(positions) or len(np.unique(positions, axis=0)) == len(positions):
+        return 0.0
+    return float((positions.max(axis=0) - positions.min(axis=0)).max())
