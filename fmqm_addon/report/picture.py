@@ -20,6 +20,7 @@ from ..metric.spatial import Floats, Ints, closest_on_triangles, dot
 from ..metric.surface import Surface, triangle_normals
 from .colormap import NO_PATCH, score_colors
 from .files import replaced
+from .probe import plane_axes
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -41,6 +42,7 @@ LIGHT = (-0.45, 0.55, 1.0)  # direction to the headlight: right, up, towards the
 CONTRAST = 0.16  # pixels that differ this much from a neighbor get more rays
 MORE_RAYS = np.array([(-1, -3), (3, -1), (1, 3), (-3, 1)]) / 8  # a turned square: no two in a row or column
 BATCH = 1 << 16  # rays per query
+HIDDEN_BEHIND = 0.01  # of the frame: what lies this much deeper than what is seen is hidden
 
 WIDTH = 1500  # pixels; the lengths and type sizes below are for a picture this wide
 GAP, BAR_WIDTH, BAR_SPACE, HEAD, FOOT = 24, 22, 86, 64, 60
@@ -53,11 +55,13 @@ class Camera:
     Attributes:
         eye: (3,) where it stands. axes: (3, 3) unit rows right, up, and forward.
         half: half the width and height of the image at distance 1.
+        near: what is nearer to the eye is not seen.
     """
 
     eye: Floats
     axes: Floats
     half: tuple[float, float]
+    near: float = 0.0
 
     @classmethod
     def framing(
@@ -84,6 +88,28 @@ class Camera:
             depths.append(-(above + below) / (2 * slope))
         eye[2] = min(depths)
         return cls(eye @ axes, axes, half)
+
+    @classmethod
+    def facing(cls, center: Floats, normal: Floats, width: float) -> Camera:
+        """The camera that looks straight at a place, in a square image that is so wide there.
+
+        What stands before the place, farther than its width, does not hide it.
+
+        Args:
+            center: (3,) the place. normal: (3,) unit, towards the camera; zero takes the usual view.
+        """
+        axes = _view_axes(AZIMUTH, ELEVATION)
+        if normal.any():
+            axes = np.stack([*plane_axes(normal), -normal])
+        half = float(np.tan(np.radians(FIELD_OF_VIEW / 2)))
+        distance = width / 2 / half
+        return cls(center - distance * axes[2], axes, (half, half), max(distance - width, 0.0))
+
+    def place_of(self, point: Floats) -> tuple[float, float]:
+        """Where in the image a (3,) point before the eye is: shares of the width from the left, of the height from
+        the top."""
+        x, y, depth = ((point - self.eye) @ self.axes.T).tolist()
+        return (1 + x / depth / self.half[0]) / 2, (1 - y / depth / self.half[1]) / 2
 
     def directions(self, x: Floats, y: Floats) -> Floats:
         """(N, 3) unit directions from the eye; x from -1 (left) to 1, y from -1 (bottom) to 1."""
@@ -158,9 +184,17 @@ def _first_hits(surface: Surface, camera: Camera, directions: Floats) -> Ints:
     triangle = np.empty(len(directions), np.int64)
     for first in range(0, len(directions), BATCH):  # a query makes Python objects of its rays
         here = slice(first, first + BATCH)
-        origins = np.broadcast_to(camera.eye, directions[here].shape)
+        origins = camera.eye + camera.near * directions[here]
         triangle[here] = surface.query.first_hit(origins, directions[here])[0]
     return triangle
+
+
+def is_seen(surface: Surface, camera: Camera, point: Floats) -> bool:
+    """Whether nothing stands between the camera and a (3,) point of the surface."""
+    towards = point - camera.eye
+    distance = float(np.linalg.norm(towards))
+    _, hit = surface.query.first_hit(camera.eye[None], (towards / distance)[None])
+    return bool(hit[0] > distance - HIDDEN_BEHIND)
 
 
 def _ray_colors(
@@ -222,6 +256,18 @@ def score_by_face(result: Result, surface: Surface, column: str = "FMQM") -> Flo
     return scores
 
 
+def three_views(
+    reference: Surface, distorted: Surface, face_scores: Floats, camera: Camera, size: tuple[int, int]
+) -> tuple[Pixels, Pixels, Pixels]:
+    """The reference, the distorted surface, and the reference colored by its (T,) face_scores; as render()."""
+    hits = pixel_hits(reference, camera, size)
+    return (
+        render(reference, camera, size, hits=hits),
+        render(distorted, camera, size),
+        render(reference, camera, size, score_colors(face_scores), hits),
+    )
+
+
 def write_picture(path: str, reference: Surface, distorted: Surface, result: Result, width: int = WIDTH) -> None:
     """A PNG of the reference, the distorted surface, and the reference colored by FMQM.
 
@@ -233,7 +279,7 @@ def write_picture(path: str, reference: Surface, distorted: Surface, result: Res
     Raises:
         FMQMError: Pillow is missing. FileError: the path cannot be written.
     """
-    _require_pillow()
+    require_pillow()
     with replaced(path) as temporary:
         compose(reference, distorted, result, width).save(temporary, "PNG")
 
@@ -244,20 +290,14 @@ def compose(reference: Surface, distorted: Surface, result: Result, width: int =
     Raises:
         FMQMError: Pillow is missing.
     """
-    _require_pillow()
+    require_pillow()
     from PIL import Image, ImageDraw
 
     sheet = _Sheet(width, natural_aspect(reference, distorted))
     faces = score_by_face(result, reference)
     camera = Camera.framing(reference, distorted, aspect=sheet.panel[1] / sheet.panel[0])
     canvas = Image.new("RGB", (width, sheet.height), BACKGROUND)
-    hits = pixel_hits(reference, camera, sheet.panel)
-    views = (
-        render(reference, camera, sheet.panel, hits=hits),
-        render(distorted, camera, sheet.panel),
-        render(reference, camera, sheet.panel, score_colors(faces), hits),
-    )
-    for index, view in enumerate(views):
+    for index, view in enumerate(three_views(reference, distorted, faces, camera, sheet.panel)):
         canvas.paste(Image.fromarray(view), (sheet.left(index), sheet.top))
     draw = ImageDraw.Draw(canvas)
     score = float(result.scores[COLUMNS.index("FMQM")])
@@ -345,7 +385,8 @@ def _to_bytes(color: Floats) -> tuple[int, int, int]:
     return red, green, blue
 
 
-def _require_pillow() -> None:
+def require_pillow() -> None:
+    """Raises FMQMError where pictures cannot be written."""
     try:
         import PIL.Image  # noqa: F401
     except ImportError as error:

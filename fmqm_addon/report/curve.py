@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""FMQM against the cost of an asset's levels, as a drawing (SVG) that takes its colors from the page."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+
+from .picture import shorten
+
+WIDTH, HEIGHT = 460, 270
+LEFT, RIGHT, TOP, BOTTOM = 44, 16, 28, 44  # margins
+LABEL = 22  # characters of a level's name
+TICKS = 4  # marks of an axis at least, where the range has room for them
+
+
+@dataclass(frozen=True)
+class Level:
+    """A point of the curve.
+
+    Attributes:
+        name: of the level. cost: more than 0. score: in [0, 1]. is_reference: what the others are compared with.
+    """
+
+    name: str
+    cost: float
+    score: float
+    is_reference: bool = False
+
+
+def curve_svg(levels: Sequence[Level], cost: str) -> str:
+    """Scores over costs, the costs on a logarithmic axis; each level is marked and named.
+
+    Args:
+        levels: at least one. cost: what it is, with its unit.
+    """
+    ordered = sorted(levels, key=lambda level: (level.cost, level.score))
+    low, high = math.log(ordered[0].cost), math.log(ordered[-1].cost)
+    if high - low < 1e-9:
+        low, high = low - 1, high + 1
+    floor = min(math.floor(min(level.score for level in levels) * 10) / 10, 0.9)
+    step = next(step for step in (0.02, 0.05, 0.1, 0.2) if (1 - floor) / step <= 5.001)
+
+    def x(value: float) -> float:
+        return LEFT + (WIDTH - LEFT - RIGHT) * (math.log(value) - low) / (high - low)
+
+    def y(score: float) -> float:
+        return HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * (score - floor) / (1 - floor)
+
+    said = "; ".join(f"{level.name}: {_short(level.cost)} {cost}, FMQM {level.score:.4f}" for level in ordered)
+    parts = [
+        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="FMQM against {escape(cost)}. {escape(said)}">'
+    ]
+    for k in range(round((1 - floor) / step) + 1):
+        score = 1 - k * step
+        parts.append(f'<line class="grid" x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{y(score):.1f}" y2="{y(score):.1f}"/>')
+        parts.append(f'<text x="{LEFT - 8}" y="{y(score) + 4:.1f}" text-anchor="end">{score:.2f}</text>')
+    for value in _ticks(math.exp(low), math.exp(high)):
+        parts.append(f'<text x="{x(value):.1f}" y="{HEIGHT - BOTTOM + 18}" text-anchor="middle">{_short(value)}</text>')
+    parts.append(f'<text x="{WIDTH - RIGHT}" y="{HEIGHT - 8}" text-anchor="end">{escape(cost)}</text>')
+    points = " ".join(f"{x(level.cost):.1f},{y(level.score):.1f}" for level in ordered)
+    parts.append(f'<polyline class="line" points="{points}"/>')
+    for level in ordered:
+        # Below to the right, or above to the left: there the curve, which rises, is not.
+        on_left = x(level.cost) < (LEFT + WIDTH - RIGHT) / 2
+        shift, drop, anchor = (8, 17, "start") if on_left else (4, -9, "end")
+        kind = ' class="reference"' if level.is_reference else ""
+        name = escape(shorten(level.name, lambda text: len(text) <= LABEL))
+        parts.append(
+            f'<circle{kind} cx="{x(level.cost):.1f}" cy="{y(level.score):.1f}" r="5">'
+            f"<title>{escape(level.name)}: {level.score:.4f}</title></circle>"
+            f'<text class="level" x="{x(level.cost) + shift:.1f}" y="{y(level.score) + drop:.1f}" '
+            f'text-anchor="{anchor}">{name}</text>'
+        )
+    return "".join(parts) + "</svg>"
+
+
+def _ticks(low: float, high: float) -> list[float]:
+    """Round numbers from low to high: powers of ten, then twice and five times these too."""
+    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    for digits in ((1,), (1, 3), (1, 2, 5), tuple(range(1, 10))):
+        found = [digit * 10.0**decade for decade in decades for digit in digits]
+        found = [value for value in found if low * 0.999 <= value <= high * 1.001]
+        if len(found) >= TICKS:
+            break
+    return found
+
+
+def _short(value: float) -> str:
+    """Three digits, with k and M for thousands and millions."""
+    for size, unit in ((1e6, "M"), (1e3, "k")):
+        if value >= size * 0.9995:
+            return f"{value / size:.3g}{unit}"
+    return f"{value:.3g}"

@@ -1,0 +1,337 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The page that people look at: every pair's score, pictures and warnings in one HTML file with pictures beside it.
+
+It needs no network and no server. Names come from strangers' files: every text goes through html.escape.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+
+from .colormap import NO_PATCH, score_colors
+from .curve import Level, curve_svg
+from .files import write_text
+from .pair import SHOWN
+
+PAGE = "index.html"
+MEGABYTE = 2**20
+MISSING = "–"
+# Nothing but what lies beside the page is ever loaded, whatever a name might hold.
+POLICY = "default-src 'none'; img-src 'self' file: data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
+
+Record = Mapping[str, Any]
+
+
+def write_page(
+    folder: str, records: Sequence[Record], settings: Mapping[str, Any], versions: Mapping[str, str]
+) -> None:
+    """Writes index.html into the folder of a report.
+
+    Args:
+        records: the pairs as JSON has them, in their order. Besides the scores each may hold "id", "trust", and
+            "pictures", which is what write_pair_pictures returned.
+        settings, versions: as JSON has them.
+
+    Raises:
+        FileError: it cannot be written; what stood there is left as it was.
+    """
+    write_text(os.path.join(folder, PAGE), page_html(records, settings, versions))
+
+
+def page_html(records: Sequence[Record], settings: Mapping[str, Any], versions: Mapping[str, str]) -> str:
+    """The page as text; the arguments are those of write_page."""
+    beside = Path(__file__).parent
+    numbered = list(enumerate(records, 1))
+    groups: dict[str, list[tuple[int, Record]]] = {}
+    for number, record in numbered:
+        groups.setdefault(record["reference"], []).append((number, record))
+    sections = "".join(_reference(reference, pairs) for reference, pairs in groups.items())
+    return f"""<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta http-equiv="Content-Security-Policy" content="{POLICY}">
+<link rel="icon" href="data:,">
+<title>FMQM report</title>
+<style>
+{(beside / "page.css").read_text(encoding="utf-8")}</style>
+</head>
+<body>
+<header>
+<h1>FMQM report</h1>
+<p class="faint">{_summary(records, len(groups))}</p>
+</header>
+<main>
+{_table(numbered)}
+{sections}
+{_settings(settings, versions)}
+</main>
+<script>
+{(beside / "page.js").read_text(encoding="utf-8")}</script>
+</body>
+</html>
+"""
+
+
+def _summary(records: Sequence[Record], references: int) -> str:
+    scored = [record for record in records if record["FMQM"] is not None]
+    said = f"{_count(len(records), 'pair')}, {_count(references, 'reference')}."
+    if scored:
+        worst = min(scored, key=lambda record: record["FMQM"])
+        said += f" Lowest FMQM: {worst['FMQM']:.4f}, {_name(worst)}."
+    if len(scored) < len(records):
+        said += f' <strong class="bad">{len(records) - len(scored)} not scored.</strong>'
+    return said + " 1 is the same as the reference; compare scores only at equal settings."
+
+
+def _table(numbered: Iterable[tuple[int, Record]]) -> str:
+    heads = "".join(
+        f'<th scope="col"><button type="button">{name}</button></th>'
+        for name in ("Pair", *SHOWN, "Triangles", "Texture MB")
+    )
+    rows = "".join(_row(number, record) for number, record in numbered)
+    return (
+        '<section class="card scroll" tabindex="0" role="region" aria-label="All pairs">'
+        f'<table class="scores"><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table></section>'
+    )
+
+
+def _row(number: int, record: Record) -> str:
+    below = f'<span class="faint">of {_base_name(record["reference"])}</span>'
+    if record["error"]:
+        below = f'<span class="bad">not scored: {_text(record["error"])}</span>'
+    name = escape(_plain_name(record))
+    cells = [f'<th scope="row" data-value="{name}"><a href="#pair-{number}">{_name(record)}</a><br>{below}</th>']
+    for column in SHOWN:
+        value = record[column]
+        cells.append(
+            f'<td class="number" data-value="{"" if value is None else value}">{_score(record, column)}{_bar(value)}</td>'
+        )
+    pictures = record.get("pictures")
+    triangles, size = (pictures["triangles"][1], pictures["texture_bytes"][1]) if pictures else (None, None)
+    cells.append(_cell(triangles, "" if triangles is None else f"{triangles:,}"))
+    cells.append(_cell(size, "" if size is None else f"{size / MEGABYTE:.1f}"))
+    return f"<tr>{''.join(cells)}</tr>"
+
+
+def _cell(value: float | None, text: str) -> str:
+    return f'<td class="number" data-value="{"" if value is None else value}">{text or MISSING}</td>'
+
+
+def _score(record: Record, column: str) -> str:
+    value = record[column]
+    if value is None:
+        return MISSING
+    stderr = record["stderr"]
+    return f"{value:.4f}" if stderr is None else f"{value:.4f} ± {stderr[column]:.4f}"
+
+
+def _bar(value: float | None) -> str:
+    """Its length and its color say the value, which stands beside it as text."""
+    if value is None:
+        return ""
+    color = _css(score_colors(np.array([value]))[0])
+    return f'<span class="bar"><span style="width:{100 * value:.1f}%;background:{color}"></span></span>'
+
+
+def _reference(reference: str, pairs: Sequence[tuple[int, Record]]) -> str:
+    articles = "".join(_pair(number, record) for number, record in pairs)
+    return f"<section><h2>{_text(reference)}</h2>{_curves(reference, pairs)}{articles}</section>"
+
+
+def _curves(reference: str, pairs: Sequence[tuple[int, Record]]) -> str:
+    """FMQM over triangles and over texture memory, where several were compared with one reference."""
+    chain = [record for _, record in pairs if record["FMQM"] is not None and record.get("pictures")]
+    if len(chain) < 2:
+        return ""
+    figures = []
+    for key, unit, title in (("triangles", 1, "triangles"), ("texture_bytes", MEGABYTE, "texture MB")):
+        costs = [record["pictures"][key][1] / unit for record in chain]
+        own = chain[0]["pictures"][key][0] / unit
+        if not all(cost > 0 for cost in (own, *costs)):
+            drawn = f'<p class="note">Not every level has a texture: there is no curve against {title}.</p>'
+        elif len({own, *costs}) == 1:
+            drawn = f'<p class="note">All levels have the same: {own:,.4g} {title}.</p>'
+        else:
+            levels = [Level(_plain_name(record), cost, record["FMQM"]) for record, cost in zip(chain, costs, strict=True)]
+            drawn = curve_svg([Level(_plain_base_name(reference), own, 1.0, True), *levels], title)
+        figures.append(f"<div><h4>FMQM against {title}</h4>{drawn}</div>")
+    return f'<div class="card curves">{"".join(figures)}</div>'
+
+
+def _pair(number: int, record: Record) -> str:
+    parts = [
+        f'<div class="title"><div><h3>{_name(record)}</h3><p class="faint">{_text(record["distorted"])}</p></div>'
+        f'<p class="score"><span class="faint">FMQM</span> {_score(record, "FMQM")}</p></div>'
+    ]
+    if record["error"]:
+        parts.append(f'<p class="bad">Not scored: {_text(record["error"])}</p>')
+    if record["warnings"]:
+        items = "".join(f"<li>{_text(warning)}</li>" for warning in record["warnings"])
+        parts.append(f'<ul class="warnings" aria-label="Warnings">{items}</ul>')
+    pictures = record.get("pictures")
+    if pictures:
+        parts.append(_views(record, pictures))
+    if record["FMQM"] is not None:
+        features = "".join(
+            f'<dt>{name}</dt><dd>{_bar(record[name])}</dd><dd class="number">{_score(record, name)}</dd>'
+            for name in SHOWN
+            if name != "FMQM"
+        )
+        close_ups = _close_ups(pictures["worst"]) if pictures else ""
+        parts.append(
+            f'<div class="panels"><div><h4>Features</h4><dl class="features">{features}</dl></div>{close_ups}</div>'
+        )
+    if record.get("trust"):
+        parts.append(_trust(record["trust"]))
+    return f'<article class="card" id="pair-{number}">{"".join(parts)}</article>'
+
+
+def _views(record: Record, pictures: Record) -> str:
+    """The three pictures on one camera; the worst patches that can be seen there are marked on the last."""
+    marks = "".join(
+        f'<span class="mark" style="left:{100 * worst["at"][0]:.1f}%;top:{100 * worst["at"][1]:.1f}%">{rank}</span>'
+        for rank, worst in enumerate(pictures["worst"], 1)
+        if worst["at"] is not None
+    )
+    costs = [
+        f"{triangles:,} triangles, {size / MEGABYTE:.1f} MB of textures"
+        for triangles, size in zip(pictures["triangles"], pictures["texture_bytes"], strict=True)
+    ]
+    size = tuple(pictures["size"])
+    name = _plain_name(record)
+    figures = (
+        (_image(pictures["reference"], f"Reference of {name}", size), "Reference", costs[0]),
+        (_image(pictures["distorted"], f"Distorted: {name}", size), "Distorted", costs[1]),
+        (_image(pictures["heat"], f"Reference colored by the FMQM of {name}", size) + marks, "Heat map", ""),
+    )
+    return '<div class="views">' + "".join(
+        f'<figure><div class="picture">{picture}</div><figcaption><strong>{title}</strong> {caption}'
+        f"{_legend(pictures['has_gaps']) if title == 'Heat map' else ''}</figcaption></figure>"
+        for picture, title, caption in figures
+    ) + "</div>"  # fmt: skip
+
+
+def _legend(has_gaps: bool) -> str:
+    stops = ",".join(_css(color) for color in score_colors(np.linspace(0, 1, 9)))
+    gap = f'<span class="gap" style="background:{_css(np.array(NO_PATCH))}"></span>no patch' if has_gaps else ""
+    ramp = f'<span class="ramp" style="background:linear-gradient(90deg,{stops})"></span>'
+    return f'<span class="legend">FMQM 0{ramp}1 {gap}</span>'
+
+
+def _close_ups(worst: Sequence[Record]) -> str:
+    if not worst:
+        return "<div><h4>Worst patches</h4><p class=\"note\">None: every patch is like the reference's.</p></div>"
+    figures = "".join(
+        f'<figure><div class="picture two">{_image(each["reference"], f"Worst patch {rank}, reference")}'
+        f"{_image(each['distorted'], f'Worst patch {rank}, distorted')}</div>"
+        f"<figcaption><strong>{rank}</strong> FMQM {each['FMQM']:.3f}; {escape(each['blame'])} {each['value']:.3f}"
+        "</figcaption></figure>"
+        for rank, each in enumerate(worst, 1)
+    )
+    return (
+        "<div><h4>Worst patches: reference, distorted; their FMQM and what lowers it most</h4>"
+        f'<div class="close-ups">{figures}</div></div>'
+    )
+
+
+def _image(path: str, alt: str, size: tuple[int, int] | None = None) -> str:
+    sized = "" if size is None else f' width="{size[0]}" height="{size[1]}"'
+    return f'<img src="{escape(quote(path))}" alt="{escape(alt)}"{sized} loading="lazy" decoding="async">'
+
+
+def _trust(trust: Record) -> str:
+    """The facts behind a score: those of both meshes side by side, then those of the pair."""
+    reference, distorted, pair = trust["reference"], trust["distorted"], trust["pair"]
+    rows = [
+        (fact, _fact(reference.get(fact)), _fact(distorted.get(fact)), _unit(reference.get(fact, distorted.get(fact))))
+        for fact in dict.fromkeys((*reference, *distorted))
+    ]
+    both = "".join(
+        f'<tr><th scope="row">{_words(fact)}</th><td>{first}</td><td>{second}</td><td class="faint">{unit}</td></tr>'
+        for fact, first, second, unit in rows
+    )
+    alone = "".join(
+        f'<tr><th scope="row">{_words(fact)}</th><td colspan="2">{_fact(item)}</td><td class="faint">{_unit(item)}</td></tr>'
+        for fact, item in pair.items()
+    )
+    return (
+        '<details><summary>How far to trust this score</summary><div class="scroll" tabindex="0" role="region" '
+        'aria-label="Trust report"><table><thead><tr><td></td><th scope="col">Reference</th>'
+        f'<th scope="col">Distorted</th><th scope="col">Unit</th></tr></thead><tbody>{both}{alone}</tbody></table>'
+        "</div></details>"
+    )
+
+
+def _fact(item: Record | None) -> str:
+    if item is None or item["value"] is None:
+        return MISSING
+    return _value(item["value"])
+
+
+def _unit(item: Record) -> str:
+    return _text(item["unit"] if item["value"] is not None else item.get("why", item["unit"]))
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, int):
+        return f"{value:,}"
+    if isinstance(value, Mapping):
+        return "<br>".join(f"{_text(name)}: {_value(part)}" for name, part in value.items()) or "none"
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return "<br>".join(_value(part) for part in value) or "none"
+    return _text("none" if value is None else value)
+
+
+def _settings(settings: Mapping[str, Any], versions: Mapping[str, str]) -> str:
+    rows = "".join(f"<div><dt>{_words(name)}</dt><dd>{_value(value)}</dd></div>" for name, value in settings.items())
+    made = ", ".join(f"{_words(name)} {_text(value)}" for name, value in versions.items())
+    return (
+        f'<section><h2>Settings</h2><dl class="card settings">{rows}</dl><p class="note">{made}. Texture MB: '
+        "the images that colors are read from, uncompressed, four bytes a pixel.</p></section>"
+    )
+
+
+def _plain_name(record: Record) -> str:
+    return str(record.get("id") or _plain_base_name(record["distorted"]))
+
+
+def _plain_base_name(path: str) -> str:
+    return Path(path).name or path
+
+
+def _name(record: Record) -> str:
+    return _text(_plain_name(record))
+
+
+def _base_name(path: str) -> str:
+    return _text(_plain_base_name(path))
+
+
+def _text(text: object) -> str:
+    """Text from anywhere as HTML; it cannot turn the direction of what stands around it."""
+    return f"<bdi>{escape(str(text))}</bdi>"
+
+
+def _words(name: str) -> str:
+    return escape(name.replace("_", " "))
+
+
+def _count(number: int, of: str) -> str:
+    return f"{number:,} {of}" if number == 1 else f"{number:,} {of}s"
+
+
+def _css(color: np.ndarray) -> str:
+    return "#" + "".join(f"{channel:02x}" for channel in np.rint(color * 255).astype(int).tolist())

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The pictures of one pair for the report's page, written while its surfaces are still at hand."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..metric.color import Texture
+from ..metric.errors import FileError
+from ..metric.score import Result
+from ..metric.surface import Surface
+from .files import check_writable, replaced
+from .picture import (
+    Camera,
+    Pixels,
+    is_seen,
+    natural_aspect,
+    render,
+    require_pillow,
+    score_by_face,
+    three_views,
+)
+from .probe import patch_view, worst_patches
+
+PICTURES = "pictures"  # the folder beside the page
+VIEW_AREA = 560**2  # pixels of a view of the whole
+CLOSE_UP = 288  # pixels; width and height of a close-up
+CLOSE_UPS = 3  # worst patches that are shown
+CLOSE_UP_MARGIN = 1.2  # a close-up is so many patch diagonals wide
+JPEG_QUALITY = 92  # with full color resolution: what is shown may be the artifacts of a texture
+BYTES_PER_PIXEL = 4  # of a texture in a graphics card's memory, uncompressed: RGBA
+
+
+def open_report_folder(folder: str) -> None:
+    """Makes the folder of a report, and says early, before minutes of work, what would fail.
+
+    Raises:
+        FMQMError: Pillow is missing. FileError: the folder cannot be made or written to.
+    """
+    require_pillow()
+    try:
+        os.makedirs(os.path.join(folder, PICTURES), exist_ok=True)
+    except OSError as error:
+        raise FileError(f"{folder}: this folder cannot be made ({error.strerror or error}); name another") from error
+    check_writable(os.path.join(folder, PICTURES, "any"))
+    check_writable(os.path.join(folder, "any"))
+
+
+def picture_stem(*parts: str) -> str:
+    """What the names of a pair's pictures begin with: safe in any file system, and its own for its own parts.
+
+    Args:
+        parts: what tells the pair from the others; the last part is what people know it by.
+    """
+    readable = re.sub(r"[^A-Za-z0-9]+", "-", Path(parts[-1]).stem).strip("-")[:40]
+    digest = hashlib.sha256("\0".join(parts).encode("utf-8", "backslashreplace")).hexdigest()
+    return f"{readable or 'pair'}-{digest[:10]}"
+
+
+def write_pair_pictures(
+    folder: str, stem: str, reference: Surface, distorted: Surface, result: Result
+) -> dict[str, Any]:
+    """Reference, distorted surface and heat map on one camera, and the worst patches of both in close-up.
+
+    Args:
+        folder: of the report, made by open_report_folder. stem: by picture_stem.
+
+    Returns:
+        What JSON can hold, for write_page: paths relative to the folder, with / in between, and what the captions say.
+
+    Raises:
+        FileError: a picture cannot be written.
+    """
+    aspect = natural_aspect(reference, distorted)
+    width = round((VIEW_AREA / aspect) ** 0.5)
+    size = (width, round(width * aspect))
+    camera = Camera.framing(reference, distorted, aspect=size[1] / size[0])
+    faces = score_by_face(result, reference)
+    views = three_views(reference, distorted, faces, camera, size)
+    names = ("reference", "distorted", "heat")
+    return {
+        **{name: _write(folder, f"{stem}-{name}", view) for name, view in zip(names, views, strict=True)},
+        "size": list(size),
+        "has_gaps": bool(np.isnan(faces).any()),
+        "worst": _close_ups(folder, stem, reference, distorted, result, camera),
+        "triangles": [surface.preparation.given for surface in (reference, distorted)],
+        "texture_bytes": [texture_bytes(surface) for surface in (reference, distorted)],
+    }
+
+
+def _close_ups(
+    folder: str, stem: str, reference: Surface, distorted: Surface, result: Result, overview: Camera
+) -> list[dict[str, Any]]:
+    found = []
+    for number, worst in enumerate(worst_patches(result, CLOSE_UPS), 1):
+        if worst.score == 1:  # nothing to see here, nor in those that follow
+            break
+        center, diagonal, normal = patch_view(result, worst.patch)
+        camera = Camera.facing(center, normal, CLOSE_UP_MARGIN * diagonal)
+        pictures = {
+            name: _write(folder, f"{stem}-worst{number}-{name}", render(surface, camera, (CLOSE_UP, CLOSE_UP)))
+            for name, surface in (("reference", reference), ("distorted", distorted))
+        }
+        seed = result.patch_centers[worst.patch]
+        found.append(
+            {
+                **pictures,
+                "FMQM": worst.score,
+                "blame": worst.blame,
+                "value": worst.value,
+                "at": overview.place_of(seed) if is_seen(reference, overview, seed) else None,
+            }
+        )
+    return found
+
+
+def texture_bytes(surface: Surface) -> int:
+    """Memory of the images that the surface's colors are read from, as RGBA bytes; an image that is shared once."""
+    images = {
+        id(pixels): pixels.shape[0] * pixels.shape[1] * BYTES_PER_PIXEL
+        for material in surface.materials
+        for pixels in _images((material.color, material.alpha))
+    }
+    return sum(images.values())
+
+
+def _images(part: object) -> Iterator[NDArray[Any]]:
+    """The pixels of every texture in a material's color, whatever it is mixed from."""
+    if isinstance(part, Texture):
+        yield part.pixels
+    elif isinstance(part, tuple):
+        for item in part:
+            yield from _images(item)
+    elif is_dataclass(part):
+        for field in fields(part):
+            yield from _images(getattr(part, field.name))
+
+
+def _write(folder: str, stem: str, view: Pixels) -> str:
+    """A JPEG; returns its path relative to the folder."""
+    from PIL import Image
+
+    name = f"{PICTURES}/{stem}.jpg"
+    with replaced(os.path.join(folder, PICTURES, f"{stem}.jpg")) as temporary:
+        Image.fromarray(view).save(temporary, "JPEG", quality=JPEG_QUALITY, subsampling=0, optimize=True)
+    return name
