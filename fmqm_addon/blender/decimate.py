@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TypeVar
 
 import bpy
 import numpy as np
@@ -27,6 +27,8 @@ TOLERANCE = 0.01  # neighboring versions differ by this share of their triangles
 LEAST_TRIANGLES = 4  # a tetrahedron
 WELD, DECIMATE = "FMQM Weld", "FMQM Decimate"  # the modifiers' names
 WELD_DISTANCE = 1e-6  # of the object's extent: float32 apart. With 0 the modifier merges nothing
+
+T = TypeVar("T")
 
 _FMQM = COLUMNS.index("FMQM")
 _PREPARED = 0.1  # share of the progress
@@ -96,7 +98,8 @@ class Search:
         self._two_rounds = few.scored_patches != (settings.scored_patches or settings.patches)
         self._measurements: dict[bool, Measurement] = {}
         self._steps: dict[tuple[bool, Version], Step] = {}
-        self.triangles = 0  # of the asset as it is; after preparing
+        self.triangles = 0  # of the asset as it is; this and its warnings after preparing
+        self.warnings: tuple[str, ...] = ()
 
     def prepare(self) -> Work[None]:
         """Raises MeshError where the asset cannot be measured."""
@@ -110,6 +113,7 @@ class Search:
             while preparing.step():
                 yield Progress("Preparing", (number + preparing.progress.done) / len(rounds))
             self._measurements[quick] = measurement
+        self.warnings = self._measurements[False].reference.warnings
 
     def ratios(self, max_triangles: int | None = None) -> list[Version]:
         """Versions with fewer and fewer triangles: TOLERANCE apart, or one triangle where that is more.
@@ -199,33 +203,84 @@ def last_passing(
     return passed
 
 
-def decimating(
-    read: Reader, targets: Sequence[float], settings: Settings, max_triangles: int | None = None
-) -> Stepper[list[Found]]:
-    """For each target the version with the fewest triangles; textures are left alone."""
-    return Stepper(_decimating(read, targets, settings, max_triangles))
+@dataclass(frozen=True)
+class Wish:
+    """What is searched for.
+
+    Attributes:
+        targets: FMQM that decimated versions must keep; empty: the triangles stay as they are.
+        max_triangles: that no version may exceed; None: as many as the asset has.
+        texture_target: FMQM that each of them must still keep with smaller textures; None: these stay as they are.
+        texture_sizes: longest sides of the color images, falling, the first the present one.
+    """
+
+    targets: tuple[float, ...] = ()
+    max_triangles: int | None = None
+    texture_target: float | None = None
+    texture_sizes: tuple[int, ...] = ()
 
 
-def _decimating(
-    read: Reader, targets: Sequence[float], settings: Settings, max_triangles: int | None
-) -> Work[list[Found]]:
+@dataclass(frozen=True)
+class Outcome:
+    """What was found for a target: first the geometry, then for it the textures, each where it was asked for."""
+
+    geometry: Found | None
+    texture: Found | None
+
+    @property
+    def last(self) -> Found:
+        """The search that ended it."""
+        found = self.texture or self.geometry
+        assert found is not None
+        return found
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """The outcomes of a wish, one a target.
+
+    Attributes:
+        triangles: of the asset as it is. warnings: what should be known of it before scores are believed.
+    """
+
+    outcomes: tuple[Outcome, ...]
+    triangles: int
+    warnings: tuple[str, ...]
+
+
+def reducing(read: Reader, wish: Wish, settings: Settings) -> Stepper[Reduced]:
+    """Searches what is wished for; its steps raise what read, Measurement and Search.ratios raise."""
+    return Stepper(_reducing(read, wish, settings))
+
+
+def _reducing(read: Reader, wish: Wish, settings: Settings) -> Work[Reduced]:
     search = Search(read, settings)
     yield from part(search.prepare(), 0.0, _PREPARED)
-    versions = search.ratios(max_triangles)
-    found = []
-    for number, target in enumerate(targets):
-        share = (1 - _PREPARED) / len(targets)
-        found.append((yield from part(search.find(target, versions), _PREPARED + share * number, share)))
-    return found
+    ratios = search.ratios(wish.max_triangles)
+    parts = max(1, len(wish.targets)) * (1 + (wish.texture_target is not None))
+    share = (1 - _PREPARED) / parts
+    outcomes: list[Outcome] = []
+    for number, target in enumerate(wish.targets or (None,)):
+        first = _PREPARED + share * parts * number / max(1, len(wish.targets))
+        geometry, texture, ratio = None, None, 1.0
+        if target is not None:
+            geometry = yield from part(search.find(target, ratios), first, share)
+            ratio = geometry.best.version.ratio
+        if wish.texture_target is not None and (geometry is None or geometry.reached):
+            versions = [Version(ratio), *(Version(ratio, size) for size in wish.texture_sizes[1:])]
+            texture = yield from part(search.find(wish.texture_target, versions), first + share, share)
+        outcomes.append(Outcome(geometry, texture))
+    return Reduced(tuple(outcomes), search.triangles, search.warnings)
 
 
-def part(work: Work[Any], first: float, share: float) -> Work[Any]:
+def part(work: Work[T], first: float, share: float) -> Work[T]:
     """Work as a part of larger work."""
     while True:
         try:
             progress = next(work)
         except StopIteration as end:
-            return end.value
+            result: T = end.value
+            return result
         yield Progress(progress.stage, first + share * progress.done)
 
 

@@ -1,0 +1,226 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Find the fewest triangles, or the smallest textures, with which an asset still looks like itself.
+
+python scripts/decimate.py REFERENCE --target-fmqm 0.9 -o out.glb
+blender -b -q --python scripts/decimate.py -- REFERENCE --chain 0.95,0.9,0.8 -o lods.glb
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from fmqm_addon.blender.process import require_bpy, take_stdout
+from fmqm_addon.metric.errors import FMQMError, SettingsError
+from fmqm_addon.metric.settings import PRESETS, Settings
+from scripts.score import FAILED, INTERRUPTED, OK, OneLineParser, ProgressLine
+
+if TYPE_CHECKING:
+    from fmqm_addon.blender.decimate import Found, Outcome, Reduced, Step
+
+
+def build_parser() -> OneLineParser:
+    parser = OneLineParser(
+        prog="decimate.py",
+        description="The fewest triangles (Decimate, collapse) or the smallest textures whose FMQM is at or above a "
+        "target, found by bisection.",
+        epilog="Exit codes: 0 found and written; 1 the target is missed even by the dearest version allowed, or a file "
+        "cannot be read or written; 2 wrong arguments.",
+        allow_abbrev=False,
+    )
+    parser.add_argument("reference", metavar="REFERENCE", help="the original, as for score.py")
+    parser.add_argument("--target-fmqm", type=float, metavar="X", help="fewest triangles with at least this FMQM")
+    parser.add_argument("--chain", type=_numbers, metavar="X,Y,...", help="the same for several targets, a file each")
+    parser.add_argument("--max-triangles", type=int, metavar="N", help="never more triangles than this")
+    parser.add_argument(
+        "--target-texture", type=float, metavar="X",
+        help="smallest textures (powers of two) with which the result still has at least this FMQM; after "
+        "--target-fmqm, of the decimated asset",
+    )  # fmt: skip
+    parser.add_argument("--preset", choices=PRESETS, default="paper", help="what decides; searching is always fast")
+    for name, text in (("samples", "number of samples"), ("patches", "number of patches"), ("seed", "random draws")):
+        parser.add_argument(f"--{name}", type=int, metavar="N", help=f"{text} (default: {getattr(Settings(), name)})")
+    parser.add_argument(
+        "-o", "--output", metavar="FILE",
+        help=".glb .obj .ply .stl .fbx .usd, or .blend, which keeps the modifier live; of a chain NAME_LOD1 and so on",
+    )  # fmt: skip
+    parser.add_argument("--json", metavar="FILE", help="targets, versions and paths; - is stdout")
+    parser.add_argument("--quiet", action="store_true", help="no progress on stderr")
+    return parser
+
+
+def _numbers(text: str) -> list[float]:
+    return [float(part) for part in text.split(",")]
+
+
+def main(argv: Sequence[str], out: TextIO) -> int:
+    """Searches as the arguments say, and prints to out; returns the exit code."""
+    parser = build_parser()
+    parser.out = out
+    args = parser.parse_args(argv)
+    try:
+        settings = _settings(args)
+        targets = _targets(args)
+    except SettingsError as error:
+        parser.error(str(error))
+    try:
+        return _search(args, targets, settings, out)
+    except FMQMError as error:
+        print(f"decimate.py: {error}", file=sys.stderr)
+        return FAILED
+
+
+def _settings(args: argparse.Namespace) -> Settings:
+    given = {name: getattr(args, name) for name in ("samples", "patches", "seed") if getattr(args, name) is not None}
+    return Settings(**(PRESETS[args.preset] | given))
+
+
+def _targets(args: argparse.Namespace) -> list[float]:
+    """Of the geometry; none where only the textures are to get smaller."""
+    if args.target_fmqm is not None and args.chain:
+        raise SettingsError("--target-fmqm and --chain are both given; give one of them")
+    targets = args.chain or ([] if args.target_fmqm is None else [args.target_fmqm])
+    wanted = [*targets, *([] if args.target_texture is None else [args.target_texture])]
+    if not wanted:
+        raise SettingsError("nothing is asked for; give --target-fmqm, --chain or --target-texture")
+    for target in wanted:
+        if not (math.isfinite(target) and 0 < target <= 1):
+            raise SettingsError(f"the target is {target}; it must be above 0 and at most 1")
+    if args.max_triangles is not None and not targets:
+        raise SettingsError("--max-triangles needs --target-fmqm or --chain")
+    return targets
+
+
+def _search(args: argparse.Namespace, targets: list[float], settings: Settings, out: TextIO) -> int:
+    """Searches, prints, writes; Blender is imported only once the arguments are known to be good."""
+    require_bpy()
+    from fmqm_addon.blender.decimate import Wish, reducing
+    from fmqm_addon.blender.reduced import check_ending, file_reader, save_version, texture_sizes
+    from fmqm_addon.report.files import check_writable, write_text
+
+    outputs = _output_names(args.output, targets if args.chain else [])
+    for path in outputs:
+        check_ending(path)
+    for path in (*outputs, args.json):
+        if path and path != "-":
+            check_writable(path)
+    sizes = () if args.target_texture is None else tuple(texture_sizes(args.reference))
+    wish = Wish(tuple(targets), args.max_triangles, args.target_texture, sizes)
+    progress = ProgressLine(1, args.quiet)
+    stepper = reducing(file_reader(args.reference), wish, settings)
+    while stepper.step():
+        progress.show(stepper.progress.done, stepper.progress.stage)
+    progress.end()
+
+    reduced = stepper.result
+    document = _json_text(args.reference, settings, reduced)
+    if args.json == "-":
+        out.write(document)
+    else:
+        out.write(_table(reduced))
+        if args.json:
+            write_text(args.json, document)
+    out.flush()
+    for warning in reduced.warnings:
+        print(f"decimate.py: warning: {warning}", file=sys.stderr)
+    for number, outcome in enumerate(reduced.outcomes):
+        if not outcome.last.reached:
+            print(f"decimate.py: {args.reference}: {_missed(outcome, args.max_triangles)}", file=sys.stderr)
+        elif outputs:
+            save_version(args.reference, outcome.last.best.version, outputs[number])
+    return OK if all(outcome.last.reached for outcome in reduced.outcomes) else FAILED
+
+
+def _output_names(output: str | None, chain: list[float]) -> list[str]:
+    """One, or for a chain NAME_LOD1 and so on."""
+    if output is None or not chain:
+        return [] if output is None else [output]
+    path = Path(output)
+    return [str(path.with_name(f"{path.stem}_LOD{number + 1}{path.suffix}")) for number in range(len(chain))]
+
+
+def _missed(outcome: Outcome, max_triangles: int | None) -> str:
+    best, target = outcome.last.best, outcome.last.target
+    score = "nothing that could be measured" if best.fmqm is None else f"FMQM {best.fmqm:.4f}"
+    if outcome.texture is not None:
+        return f"the target {target:g} is missed even with the textures as they are ({score}); ask for less"
+    allowed = "all triangles" if max_triangles is None else f"the {max_triangles} triangles that are allowed"
+    return f"the target {target:g} is missed even with {allowed} ({score}); ask for less, or allow more"
+
+
+def _table(reduced: Reduced) -> str:
+    """The path of every search, then what was found."""
+    rows = []
+    for outcome in reduced.outcomes:
+        for found in (outcome.geometry, outcome.texture):
+            if found is None:
+                continue
+            rows += [(f"{found.target:g}", *_cells(step), "fast" if step.quick else "") for step in found.path]
+            rows.append((f"{found.target:g}", *_cells(found.best), "found" if found.reached else "missed"))
+    rows.insert(0, ("target", "ratio", "triangles", "texture", "FMQM", ""))
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    return "".join(
+        "  ".join(cell.rjust(width) for cell, width in zip(row[:-1], widths, strict=False))
+        + f"  {row[-1]}".rstrip()
+        + "\n"
+        for row in rows
+    )
+
+
+def _cells(step: Step) -> tuple[str, str, str, str]:
+    texture = "-" if step.version.texture is None else str(step.version.texture)
+    return f"{step.version.ratio:.4f}", str(step.triangles), texture, "-" if step.fmqm is None else f"{step.fmqm:.4f}"
+
+
+def _json_text(reference: str, settings: Settings, reduced: Reduced) -> str:
+    document = {
+        "reference": reference,
+        "triangles": reduced.triangles,
+        "settings": settings.as_dict(),
+        "warnings": list(reduced.warnings),
+        "found": [
+            {"geometry": _found_dict(outcome.geometry), "texture": _found_dict(outcome.texture)}
+            for outcome in reduced.outcomes
+        ],
+    }
+    return json.dumps(document, indent=2, allow_nan=False) + "\n"
+
+
+def _found_dict(found: Found | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    return {
+        "target": found.target,
+        "reached": found.reached,
+        "best": _step_dict(found.best),
+        "below": None if found.below is None else _step_dict(found.below),
+        "path": [_step_dict(step) for step in found.path],
+    }
+
+
+def _step_dict(step: Step) -> dict[str, Any]:
+    return {**asdict(step.version), "triangles": step.triangles, "FMQM": step.fmqm, "fast": step.quick}
+
+
+def run() -> None:
+    """Arguments to exit code; under Blender, whose name argv[0] is then, the arguments follow --."""
+    argv = sys.argv[1:]
+    if Path(sys.argv[0]).name != Path(__file__).name:
+        argv = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
+    try:
+        code = main(argv, take_stdout())
+    except KeyboardInterrupt:
+        code = INTERRUPTED
+    sys.exit(code)
+
+
+if __name__ == "__main__":
+    run()
