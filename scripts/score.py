@@ -2,33 +2,48 @@
 """Score textured meshes against a reference.
 
 python scripts/score.py REFERENCE DISTORTED [DISTORTED ...]
+python scripts/score.py --manifest FILE | REFERENCE --glob PATTERN | --lods FILE
 blender -b -q --python scripts/score.py -- REFERENCE DISTORTED [DISTORTED ...]
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
+import os
+import shutil
+import signal
 import sys
-import time
-from collections.abc import Callable, Sequence
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn, TextIO, TypeVar
+from typing import TYPE_CHECKING, Any, NoReturn, TextIO
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from fmqm_addon.blender.process import require_bpy, take_stdout
+from fmqm_addon import VERSION
+from fmqm_addon.batch.cluster import score_on_cluster
+from fmqm_addon.batch.journal import Journal, Records, row_key
+from fmqm_addon.batch.log import Log
+from fmqm_addon.batch.merge import Merged
+from fmqm_addon.batch.rows import Options, Row, Task
+from fmqm_addon.batch.run import score_tasks, units_of, work_off
+from fmqm_addon.batch.sources import glob_files, lod_rows, plain_rows, read_manifest
+from fmqm_addon.batch.workers import Limits, adopt, score_with_workers, workers_command
+from fmqm_addon.blender.process import blender_version, require_bpy, take_stdout
 from fmqm_addon.blender.space import SPACES
 from fmqm_addon.metric.errors import FMQMError, SettingsError
 from fmqm_addon.metric.settings import CENTERS, COLOR_SPACES, POOLINGS, PRESETS, SETTING_NAMES, Settings
+from fmqm_addon.report.files import check_writable, write_parts
+from fmqm_addon.report.junit import below, junit_parts
+from fmqm_addon.report.pair import csv_parts, json_parts, table_parts
 
 if TYPE_CHECKING:
-    from fmqm_addon.blender.measure import Comparison, Measurement
-    from fmqm_addon.blender.space import Placed
-    from fmqm_addon.metric.score import Stepper
+    from fmqm_addon.batch.run import Scored
 
 OK, FAILED, WRONG_ARGUMENTS, INTERRUPTED = 0, 1, 2, 130
-T = TypeVar("T")
+PROGRAM = "score.py"
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -45,20 +60,44 @@ class OneLineParser(argparse.ArgumentParser):
 
 def build_parser() -> OneLineParser:
     parser = OneLineParser(
-        prog="score.py",
+        prog=PROGRAM,
         description="FMQM: how much textured meshes look like their reference; 1 is the same.",
-        epilog="Files: .obj .ply .stl .glb .gltf .fbx .usd .usda .usdc .usdz .abc .blend, and file.blend:Object name. "
+        epilog="Files: .obj .ply .stl .glb .gltf .fbx .usd .usda .usdc .usdz .abc .blend, and file.glb:Object name. "
         "Exit codes: 0 all scored, and at or above --fail-under; 1 a pair failed or fell below it, or a file cannot be "
         "read or written; 2 wrong arguments.",
         allow_abbrev=False,
     )
-    parser.add_argument("reference", metavar="REFERENCE", help="the original")
-    parser.add_argument("distorted", metavar="DISTORTED", nargs="+", help="what is scored against it")
+    parser.add_argument("reference", metavar="REFERENCE", nargs="?", help="the original")
+    parser.add_argument("distorted", metavar="DISTORTED", nargs="*", help="what is scored against it")
     parser.add_argument("--ref-texture", metavar="IMG", help="replaces the base-color image of the whole reference")
     parser.add_argument(
         "--texture", metavar="IMG", action="append", default=[],
         help="replaces that of the distorted: once for all, or once per DISTORTED",
     )  # fmt: skip
+
+    batch = parser.add_argument_group("batches")
+    batch.add_argument(
+        "--manifest", metavar="FILE",
+        help="pairs from a .csv with a header, or a .json list of objects: reference, distorted, and if wanted id, "
+        "ref_texture, texture, fail_under and any setting",
+    )  # fmt: skip
+    batch.add_argument("--glob", metavar="PATTERN", help="score the files that match against REFERENCE")
+    batch.add_argument(
+        "--lods", metavar="FILE", help="score each level of the file's LOD chains against level 0 and the level before"
+    )
+    batch.add_argument("--jobs", type=int, metavar="N", help="score in N watched processes")
+    batch.add_argument(
+        "--timeout", type=float, metavar="SECONDS", help="a worker may take so long for a pair (default: 3600)"
+    )
+    batch.add_argument("--memory-limit", type=float, metavar="GB", help="a worker may take so much memory")
+    batch.add_argument(
+        "--journal", metavar="FILE", help="what is done, line by line (default: the first output with .journal.jsonl)"
+    )
+    batch.add_argument("--resume", action="store_true", help="score only what the journal has not")
+    batch.add_argument("--shard", metavar="I/N", help="score only every Nth pair, from the Ith on")
+    batch.add_argument("--merge", metavar="FILE", nargs="+", help="score nothing: join the JSON outputs of shards")
+    batch.add_argument("--dask", metavar="ADDRESS", help="score on the Dask cluster of this scheduler")
+    batch.add_argument("--worker", metavar="SHARD", help=argparse.SUPPRESS)  # score a shard for the process above
 
     settings = parser.add_argument_group("settings (the paper's values are the defaults)")
     settings.add_argument("--preset", choices=PRESETS, default="paper", help="explicit flags win over it")
@@ -98,6 +137,7 @@ def build_parser() -> OneLineParser:
         "--json", metavar="FILE", help="everything as JSON; - is stdout, which then carries nothing else"
     )
     output.add_argument("--csv", metavar="FILE", help="one row a pair")
+    output.add_argument("--junit", metavar="FILE", help="one test case a pair, for build servers")
     output.add_argument("--save-fields", metavar="FILE.npz", help="samples, fields and patch scores of the one pair")
     output.add_argument("--picture", metavar="FILE.png", help="reference, distorted and heat map of the one pair")
     output.add_argument("--fail-under", type=float, metavar="X", help="exit code 1 if an FMQM is below X")
@@ -109,20 +149,31 @@ def main(argv: Sequence[str], out: TextIO) -> int:
     """Scores as the arguments say, and prints to out; returns the exit code."""
     parser = build_parser()
     parser.out = out
-    args = parser.parse_args(argv)
+    args = parser.parse_intermixed_args(argv)
     try:
         chosen = PRESETS[args.preset] | {
             name: getattr(args, name) for name in SETTING_NAMES if getattr(args, name) is not None
         }
-        settings = Settings(**chosen)
+        options = Options(Settings(**chosen), args.repeats, args.space, args.match_scale)
         _check_arguments(args)
-        settings.with_seed(settings.seed + args.repeats - 1)
+        options.settings.with_seed(options.settings.seed + args.repeats - 1)
+        limits = Limits(args.timeout or Limits.timeout, args.memory_limit and args.memory_limit * 1e9)
     except SettingsError as error:
         parser.error(str(error))
     try:
-        return _score(args, settings, out)
+        if args.worker:
+            require_bpy()
+            work_off(args.worker, options, limits.timeout)
+            return OK
+        for path in (args.json, args.csv, args.junit, args.save_fields, args.picture, args.journal):
+            if path and path != "-":
+                check_writable(path)
+        rows = _rows(args, options)
+        if args.merge:
+            return _merge(args, rows, out)
+        return _score(args, rows or [], options, limits, argv, out)
     except FMQMError as error:
-        print(f"score.py: {error}", file=sys.stderr)
+        print(f"{PROGRAM}: {error}", file=sys.stderr)
         return FAILED
 
 
@@ -131,171 +182,193 @@ def _check_arguments(args: argparse.Namespace) -> None:
         raise SettingsError(f"repeats is {args.repeats}; it must be at least 1")
     if args.fail_under is not None and not 0 <= args.fail_under <= 1:
         raise SettingsError(f"fail-under is {args.fail_under}; it must be between 0 and 1")
-    if len(args.texture) not in (0, 1, len(args.distorted)):
-        raise SettingsError(
-            f"--texture is given {len(args.texture)} times for {len(args.distorted)} files; "
-            "give it once, or once per DISTORTED"
-        )
-    for flag in ("save_fields", "picture"):
-        if getattr(args, flag) and len(args.distorted) != 1:
-            raise SettingsError(
-                f"--{flag.replace('_', '-')} takes exactly one DISTORTED; {len(args.distorted)} are given"
-            )
     if args.save_fields and not args.save_fields.endswith(".npz"):
         raise SettingsError(f"--save-fields {args.save_fields}: the file must end in .npz")
+    _check_sources(args)
+    for flag, least in (("jobs", 1), ("timeout", 0), ("memory_limit", 0)):
+        value = getattr(args, flag)
+        if value is not None and not (value >= 1 if least else 0 < value < float("inf")):
+            raise SettingsError(f"{_flag(flag)} is {value}; it must be {'at least 1' if least else 'above 0'}")
+    for flag in ("timeout", "memory_limit"):
+        if getattr(args, flag) is not None and not (args.jobs or args.dask):
+            raise SettingsError(f"{_flag(flag)} is for workers; give --jobs too")
+    if args.jobs and args.dask:
+        raise SettingsError("--jobs and --dask exclude each other; a cluster has workers of its own")
+    if args.resume and not _journal_path(args):
+        raise SettingsError("--resume needs --journal, or an output file beside which the journal is")
+    if args.shard:
+        _shard(args.shard)
+    for flag in ("save_fields", "picture"):
+        if not getattr(args, flag):
+            continue
+        if len(args.distorted) != 1:
+            raise SettingsError(f"{_flag(flag)} takes exactly one DISTORTED; {len(args.distorted)} are given")
+        if args.jobs or args.dask or args.resume or args.shard:
+            raise SettingsError(f"{_flag(flag)} is of a pair that this process scores; leave out the batch's flags")
 
 
-def _score(args: argparse.Namespace, settings: Settings, out: TextIO) -> int:
-    """Loads, scores and writes; Blender is imported only once the arguments are known to be good."""
-    require_bpy()
-    import bpy
+def _check_sources(args: argparse.Namespace) -> None:
+    """One way of naming pairs."""
+    given = [flag for flag in ("manifest", "glob", "lods") if getattr(args, flag)]
+    if len(given) > 1 or (given and args.distorted):
+        raise SettingsError(f"{_flag(given[0])} names pairs already; leave out {_flag(given[1:]) or 'DISTORTED'}")
+    if args.reference and given not in ([], ["glob"]):
+        raise SettingsError(f"{_flag(given[0])} names references itself; leave out {args.reference}")
+    if given in (["manifest"], ["lods"]) and (args.texture or args.ref_texture):
+        raise SettingsError(f"--texture and --ref-texture do not go with {_flag(given[0])}; name them in a manifest")
+    if not args.merge and not args.worker and given in ([], ["glob"]):
+        missing = "REFERENCE" if not args.reference else "" if given or args.distorted else "DISTORTED"
+        if missing:
+            raise SettingsError(f"{missing} is missing")
 
-    from fmqm_addon import VERSION
-    from fmqm_addon.report.fields import save_fields
-    from fmqm_addon.report.files import check_writable, write_text
-    from fmqm_addon.report.pair import csv_text, json_text, table_text
-    from fmqm_addon.report.picture import write_picture
 
-    for path in (args.json, args.csv, args.save_fields, args.picture):
-        if path and path != "-":
-            check_writable(path)
-    run = Run(args, settings)
-    run.score()
-    json_document = json_text(
-        run.pairs,
-        settings.as_dict() | {"repeats": args.repeats, "space": args.space, "match_scale": args.match_scale},
-        {"fmqm_version": VERSION, "blender_version": bpy.app.version_string},
-    )
-    if args.json == "-":
-        out.write(json_document)
+def _flag(name: str | Sequence[str]) -> str:
+    name = name if isinstance(name, str) else "".join(name[:1])
+    return f"--{name.replace('_', '-')}" if name else ""
+
+
+def _shard(text: str) -> tuple[int, int]:
+    first, _, count = text.partition("/")
+    if not (first.isdecimal() and count.isdecimal() and 1 <= int(first) <= int(count)):
+        raise SettingsError(f"--shard is {text}; it must be such as 2/5: every 5th pair, from the 2nd on")
+    return int(first), int(count)
+
+
+def _rows(args: argparse.Namespace, options: Options) -> list[Row] | None:
+    """The pairs that the arguments name; None for none, which only a merge knows."""
+    if args.manifest:
+        rows = read_manifest(args.manifest, options.settings)
+    elif args.lods:
+        require_bpy()
+        rows = lod_rows(args.lods)
+    elif args.reference:
+        names = glob_files(args.reference, args.glob) if args.glob else args.distorted
+        rows = plain_rows(args.reference, names, args.ref_texture or "", args.texture)
     else:
-        out.write(table_text(run.pairs))
-        if args.json:
-            write_text(args.json, json_document)
-    if args.csv:
-        write_text(args.csv, csv_text(run.pairs))
-    if run.last is not None:
-        if args.save_fields:
-            save_fields(args.save_fields, run.last.result)
-        if args.picture:
-            write_picture(args.picture, run.measurement.reference, run.last.distorted, run.last.result)
-    out.flush()
-    return run.exit_code
+        return None
+    if args.shard:
+        first, count = _shard(args.shard)
+        rows = rows[first - 1 :: count]
+    return rows
 
 
-class Run:
-    """The pairs of one command line: one reference, scored pair after pair."""
+def _journal_path(args: argparse.Namespace) -> str | None:
+    """Beside the first output file, unless it is named; None where there is neither."""
+    if args.journal:
+        return str(args.journal)
+    first = next((path for path in (args.json, args.csv, args.junit) if path and path != "-"), None)
+    return f"{first}.journal.jsonl" if first else None
 
-    def __init__(self, args: argparse.Namespace, settings: Settings) -> None:
-        from fmqm_addon.report.pair import PairScore
 
-        self.args = args
-        self.settings = settings
-        self.pairs: list[PairScore] = []
-        self.last: Comparison | None = None  # the newest comparison, for its fields and picture
-        self.measurement: Measurement
-        self._progress = ProgressLine(len(args.distorted) + 1, args.quiet)
+def _merge(args: argparse.Namespace, rows: list[Row] | None, out: TextIO) -> int:
+    merged = Merged(args.merge, rows, Log(PROGRAM, 1, 1))
+    _write(args, merged, merged.settings, merged.versions, out)
+    return _exit_code(merged)
 
-    @property
-    def exit_code(self) -> int:
-        limit = self.args.fail_under or 0.0
-        scores = [pair.fmqm for pair in self.pairs]
-        return OK if all(score is not None and score >= limit for score in scores) else FAILED
 
-    def score(self) -> None:
-        from fmqm_addon.blender.measure import Measurement
-        from fmqm_addon.blender.space import place
-        from fmqm_addon.report.pair import PairScore
-
-        args = self.args
-        began = time.perf_counter()
-        seconds: dict[str, float] = {}
-        error: FMQMError | None = None
+def _score(
+    args: argparse.Namespace, rows: list[Row], options: Options, limits: Limits, argv: Sequence[str], out: TextIO
+) -> int:
+    """Scores what the journal has not, and writes what it has."""
+    versions = {"fmqm_version": VERSION, "blender_version": blender_version()}
+    keys = [row_key(row, options, versions) for row in rows]
+    path = _journal_path(args)
+    journal = Journal(path, args.resume)
+    scored = None
+    with _folder_of_workers(path) as folder:
+        if args.resume:
+            adopt(folder, journal)
+        waiting = {key: Task(key, row) for key, row in zip(keys, rows, strict=True) if key not in journal}
+        tasks = list(waiting.values())
         try:
-            self._progress.show(0, f"loading {args.reference}")
-            reference = _timed(seconds, lambda: self._load(args.reference, args.ref_texture))
-            self.measurement = Measurement(reference.world(), self.settings, args.repeats)
-            self._work(self.measurement.prepare(), 0, "preparing the reference", seconds)
-        except FMQMError as reason:
-            error = reason
-        textures = args.texture * len(args.distorted) if len(args.texture) == 1 else args.texture
-        for index, name in enumerate(args.distorted):
-            pair = PairScore(args.reference, name)
-            try:
-                if error is not None:
-                    raise error
-                self._progress.show(index + 1, f"loading {name}")
-                texture = textures[index] if textures else None
-                loaded = _timed(seconds, lambda name=name, texture=texture: self._load(name, texture))  # type: ignore[misc]
-                placement = place(reference, loaded, args.space, args.match_scale)
-                compared = self._work(self.measurement.compare(placement.mesh), index + 1, f"scoring {name}", seconds)
-                result = compared.result
-                self.last = compared
-                pair = replace(
-                    pair,
-                    scores=compared.scores,
-                    stderr=compared.stderr,
-                    patches=len(result.patches),
-                    samples=len(result.samples.positions),
-                    space=placement.label,
-                    warnings=(*placement.notes, *placement.warnings, *result.warnings),
-                )
-            except FMQMError as reason:
-                pair = replace(pair, error=str(reason))
-                print(f"score.py: {reason}", file=sys.stderr)
-            now = time.perf_counter()
-            self.pairs.append(replace(pair, seconds={**seconds, "total": now - began}))
-            began, seconds = now, {}
-        self._progress.end()
-        for warning in dict.fromkeys(warning for pair in self.pairs for warning in pair.warnings):
-            print(f"score.py: warning: {warning}", file=sys.stderr)
+            scored = _score_tasks(args, tasks, options, limits, argv, journal, folder)
+        except KeyboardInterrupt:
+            if path:
+                print(f"{PROGRAM}: interrupted; --resume goes on where {path} ends", file=sys.stderr)
+            raise
+    records = Records(rows, keys, journal, args.fail_under)
+    _say_warnings(records)
+    _write(args, records, options.as_dict(), versions, out)
+    if scored is not None:
+        from fmqm_addon.report.fields import save_fields
+        from fmqm_addon.report.picture import write_picture
 
-    def _load(self, spec: str, image: str | None) -> Placed:
-        from fmqm_addon.blender.files import load_placed
-        from fmqm_addon.blender.material import load_texture
-
-        return load_placed(spec, load_texture(image) if image else None)
-
-    def _work(self, stepper: Stepper[T], index: int, text: str, seconds: dict[str, float]) -> T:
-        """Runs a stepper to its end with its progress shown and its seconds added up by stage."""
-        while stepper.step():
-            self._progress.show(index + stepper.progress.done, text)
-        for stage, spent in stepper.seconds.items():
-            seconds[stage] = seconds.get(stage, 0.0) + spent
-        return stepper.result
+        if args.save_fields:
+            save_fields(args.save_fields, scored.result)
+        if args.picture:
+            write_picture(args.picture, scored.reference, scored.distorted, scored.result)
+    code = _exit_code(records)
+    batch = args.manifest or args.glob or args.lods or args.jobs or args.dask or args.journal or args.resume
+    journal.close() if batch else journal.remove()
+    return code
 
 
-def _timed(seconds: dict[str, float], load: Callable[[], Placed]) -> Placed:
-    began = time.perf_counter()
+def _score_tasks(
+    args: argparse.Namespace,
+    tasks: list[Task],
+    options: Options,
+    limits: Limits,
+    argv: Sequence[str],
+    journal: Journal,
+    folder: Path,
+) -> Scored | None:
+    """On the cluster, by workers, or here."""
+    if args.dask:
+        tasks = [replace(task, row=replace(task.row, folder=os.path.abspath(task.row.folder))) for task in tasks]
+        score_on_cluster(tasks, args.dask, argv, limits, journal, Log(PROGRAM, len(tasks), len(tasks), args.quiet))
+    elif args.jobs:
+        folder.mkdir(exist_ok=True)
+        log = Log(PROGRAM, len(tasks), len(tasks), args.quiet)
+        command = workers_command(str(Path(__file__).resolve()), argv)
+        score_with_workers(tasks, command, folder, args.jobs, limits, journal, log)
+    elif tasks:
+        require_bpy()
+        return score_tasks(tasks, options, journal, Log(PROGRAM, units_of(tasks), len(tasks), args.quiet))
+    return None
+
+
+@contextlib.contextmanager
+def _folder_of_workers(journal: str | None) -> Iterator[Path]:
+    """Beside the journal, so that a run that was killed leaves it to the next one."""
+    folder = Path(f"{journal}.workers" if journal else tempfile.mkdtemp(prefix="fmqm-"))
     try:
-        return load()
+        yield folder
     finally:
-        seconds["load"] = seconds.get("load", 0.0) + time.perf_counter() - began
+        shutil.rmtree(folder, ignore_errors=True)
 
 
-class ProgressLine:
-    """Progress on stderr: a moving line on a terminal, a line per 10 % otherwise."""
+def _write(
+    args: argparse.Namespace,
+    records: Iterable[Mapping[str, Any]],
+    settings: Mapping[str, Any],
+    versions: Mapping[str, str],
+    out: TextIO,
+) -> None:
+    if args.json == "-":
+        out.writelines(json_parts(records, settings, versions))
+    else:
+        out.writelines(table_parts(records))
+        if args.json:
+            write_parts(args.json, json_parts(records, settings, versions))
+    if args.csv:
+        write_parts(args.csv, csv_parts(records))
+    if args.junit:
+        write_parts(args.junit, junit_parts(records))
+    out.flush()
 
-    def __init__(self, total: int, quiet: bool) -> None:
-        self._total = total
-        self._quiet = quiet
-        self._moving = sys.stderr.isatty()
-        self._percent = -1
 
-    def show(self, done: float, text: str) -> None:
-        percent = int(100 * done / self._total)
-        step = 1 if self._moving else 10
-        if self._quiet or percent // step <= self._percent // step:
-            return
-        self._percent = percent
-        if self._moving:
-            print(f"\r\x1b[K{percent:3d} %  {text}", end="", file=sys.stderr, flush=True)
-        else:
-            print(f"{percent:3d} %  {text}", file=sys.stderr, flush=True)
+def _say_warnings(records: Iterable[Mapping[str, Any]]) -> None:
+    """Each once."""
+    said: set[int] = set()
+    for record in records:
+        for warning in record["warnings"]:
+            if hash(warning) not in said:
+                said.add(hash(warning))
+                print(f"{PROGRAM}: warning: {warning}", file=sys.stderr)
 
-    def end(self) -> None:
-        if self._moving and not self._quiet:
-            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+
+def _exit_code(records: Iterable[Mapping[str, Any]]) -> int:
+    return FAILED if any(record["error"] is not None or below(record) for record in records) else OK
 
 
 def run() -> None:
@@ -303,6 +376,8 @@ def run() -> None:
     argv = sys.argv[1:]
     if Path(sys.argv[0]).name != Path(__file__).name:
         argv = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
+    for number in (signal.SIGINT, signal.SIGTERM):  # Blender sets its own; a build server's stop is a Ctrl-C
+        signal.signal(number, signal.default_int_handler)
     try:
         code = main(argv, take_stdout())
     except KeyboardInterrupt:

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,11 +12,11 @@ import bpy
 from ..metric.color import Texture
 from ..metric.errors import FileError, FMQMError, MeshError
 from ..metric.surface import MeshArrays
+from .lods import find_chains
 from .snapshot import placed
 from .space import Placed
+from .spec import SUFFIXES, split_spec
 from .truncated import check_alembic, check_ply
-
-_OBJECT_IN_BLEND = re.compile(r"(.*?\.blend):(.+)", re.IGNORECASE | re.DOTALL)
 
 
 def load_mesh(spec: str, texture: Texture | None = None) -> MeshArrays:
@@ -29,7 +28,7 @@ def load_placed(spec: str, texture: Texture | None = None) -> Placed:
     """The asset in a file as one mesh, with its place; nothing stays in the session.
 
     Args:
-        spec: a path, or "file.blend:Object name" for one object, hidden or not. Of a whole file the
+        spec: a path, or "file.glb:Object name" for one object, hidden or not. Of a whole file the
             render-visible meshes count.
         texture: replaces the base-color images of the whole asset.
 
@@ -73,10 +72,20 @@ def open_file(path: str) -> None:
         raise FileError(f"{path}: {_last_line(error)}") from error
 
 
-def split_spec(spec: str) -> tuple[str, str]:
-    """Path and object name ("" for the whole file); drive letters stay with the path."""
-    match = None if os.path.isfile(spec) else _OBJECT_IN_BLEND.fullmatch(spec)
-    return (match[1], match[2]) if match else (spec, "")
+def chains_of_file(path: str) -> list[tuple[str, list[tuple[int, str]]]]:
+    """The chains of detail that the names of a file's objects tell: name, and level and object from fine to coarse.
+
+    Raises:
+        FileError: as open_file.
+    """
+    try:
+        open_file(path)
+        return [
+            (name, [(level, object_.name) for level, object_ in levels])
+            for name, levels in find_chains(bpy.context.scene)
+        ]
+    finally:
+        _clear_session()
 
 
 def _clear_session() -> None:
@@ -113,7 +122,6 @@ _IMPORTERS: dict[str, Callable[[], bpy.types.Operator]] = {
     ".usdz": lambda: bpy.ops.wm.usd_import,
     ".abc": lambda: bpy.ops.wm.alembic_import,
 }
-SUFFIXES = (*_IMPORTERS, ".blend")
 _CHECKS = {".abc": check_alembic, ".ply": check_ply}
 
 

@@ -62,6 +62,20 @@ def find_lods(scene: bpy.types.Scene, active: bpy.types.Object | None) -> LODGro
     return None
 
 
+def find_chains(scene: bpy.types.Scene) -> list[tuple[str, list[tuple[int, bpy.types.Object]]]]:
+    """Every chain that the names of mesh objects tell: its name, and its levels from fine to coarse.
+
+    Level -1 is the original that stands without a level beside those with one.
+    """
+    groups = _groups(_outermost(object_ for object_ in scene.objects if object_.type == "MESH"))
+    chains = []
+    for stem, levels in sorted(groups.items()):
+        finest = levels[min(levels)].name
+        at = finest.lower().find(stem)
+        chains.append((finest[at : at + len(stem)] if at >= 0 else stem, sorted(levels.items())))
+    return chains
+
+
 def _family(active: bpy.types.Object | None) -> list[bpy.types.Object]:
     """The active object and what it hangs from, the nearest first."""
     family = []
@@ -77,10 +91,16 @@ def _outermost(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
 
 
 def _by_names(assets: Sequence[Asset], mine: Sequence[Asset]) -> tuple[Asset, ...]:
-    """The levels of the group that one of mine belongs to, or else of the only group; () if there is none.
+    """The levels of the group that one of mine belongs to, or else of the only group; () if there is none."""
+    groups = _groups(assets)
+    chosen = next((_stem(asset) for asset in mine if _stem(asset) in groups), None)
+    if chosen is None and len(groups) == 1:
+        chosen = next(iter(groups))
+    return () if chosen is None else tuple(groups[chosen][level] for level in sorted(groups[chosen]))
 
-    A group has at least two levels. Of Rock_LOD1 and its copies Rock_LOD1.001 the first is taken.
-    """
+
+def _groups(assets: Sequence[Asset]) -> dict[str, dict[int, Asset]]:
+    """Levels by the asset's name, two at least. Of Rock_LOD1 and its copies Rock_LOD1.001 the first is taken."""
     groups: dict[str, dict[int, Asset]] = {}
     for asset in sorted(assets, key=lambda asset: asset.name_full):
         found = lod_of_name(asset.name)
@@ -90,11 +110,7 @@ def _by_names(assets: Sequence[Asset], mine: Sequence[Asset]) -> tuple[Asset, ..
         stem = _stem(asset)
         if lod_of_name(asset.name) is None and stem in groups and 0 not in groups[stem]:
             groups[stem][-1] = asset
-    whole = {stem: levels for stem, levels in groups.items() if len(levels) > 1}
-    chosen = next((_stem(asset) for asset in mine if _stem(asset) in whole), None)
-    if chosen is None and len(whole) == 1:
-        chosen = next(iter(whole))
-    return () if chosen is None else tuple(whole[chosen][level] for level in sorted(whole[chosen]))
+    return {stem: levels for stem, levels in groups.items() if len(levels) > 1}
 
 
 def _stem(asset: Asset) -> str:

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
+import importlib.metadata
 import os
 import sys
 from typing import TextIO
@@ -30,6 +32,19 @@ def require_bpy() -> None:
         raise FMQMError(
             f"bpy lacks a system library ({error}); on Debian or Ubuntu: apt-get install {SYSTEM_PACKAGES}"
         ) from error
+
+
+def blender_version() -> str:
+    """Blender's version, such as 4.5.15, without importing bpy where its package tells.
+
+    Raises:
+        FMQMError: there is no bpy.
+    """
+    if "bpy" not in sys.modules:
+        with contextlib.suppress(importlib.metadata.PackageNotFoundError):
+            return importlib.metadata.version("bpy")
+    require_bpy()
+    return ".".join(map(str, sys.modules["bpy"].app.version))
 
 
 def take_stdout() -> TextIO:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -38,8 +38,16 @@ def replaced(path: str) -> Iterator[str]:
 
 
 def write_text(path: str, text: str) -> None:
-    with replaced(path) as temporary:
-        Path(temporary).write_text(text, encoding="utf-8", errors="backslashreplace", newline="")
+    write_parts(path, [text])
+
+
+def write_parts(path: str, parts: Iterable[str]) -> None:
+    """As write_text, for a text that is made while it is written."""
+    with (
+        replaced(path) as temporary,
+        open(temporary, "w", encoding="utf-8", errors="backslashreplace", newline="") as file,
+    ):
+        file.writelines(parts)
 
 
 def check_writable(path: str) -> None:

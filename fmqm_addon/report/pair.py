@@ -6,8 +6,10 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Sequence
+import textwrap
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -43,49 +45,56 @@ class PairScore:
     error: str | None = None
     space: str | None = None
 
-    @property
-    def fmqm(self) -> float | None:
-        return None if self.scores is None else float(self.scores[_INDEX["FMQM"]])
-
 
 def json_text(pairs: Sequence[PairScore], settings: dict[str, Any], versions: dict[str, str]) -> str:
-    document = {**versions, "settings": settings, "pairs": [_pair_dict(pair) for pair in pairs]}
-    return json.dumps(document, indent=2, allow_nan=False) + "\n"
+    return "".join(json_parts(map(pair_record, pairs), settings, versions))
 
 
 def csv_text(pairs: Sequence[PairScore]) -> str:
-    """Numbers at full precision with a decimal point, whatever the locale; fields that failed are empty."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(["reference", "distorted", *SHOWN, "error"])
-    for pair in pairs:
-        numbers = ["" if value is None else repr(value) for value in _columns(pair.scores).values()]
-        writer.writerow([pair.reference, pair.distorted, *numbers, pair.error or ""])
-    return out.getvalue()
+    return "".join(csv_parts(map(pair_record, pairs)))
 
 
 def table_text(pairs: Sequence[PairScore]) -> str:
-    """An aligned table, one row a pair."""
-    rows = [["distorted", *SHOWN]]
-    for pair in pairs:
-        if pair.scores is None:
-            rows.append([pair.distorted, *["-"] * len(SHOWN)])
-            continue
-        cells = []
-        for name in SHOWN:
-            cell = f"{pair.scores[_INDEX[name]]:.4f}"
-            cells.append(cell if pair.stderr is None else f"{cell} ±{pair.stderr[_INDEX[name]]:.4f}")
-        rows.append([pair.distorted, *cells])
-    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
-    lines = []
-    for row in rows:
-        cells = [row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))]
-        lines.append("  ".join(cells).rstrip())
-    return "\n".join(lines) + "\n"
+    return "".join(table_parts([pair_record(pair) for pair in pairs]))
 
 
-def _pair_dict(pair: PairScore) -> dict[str, Any]:
+def json_parts(
+    records: Iterable[Mapping[str, Any]], settings: Mapping[str, Any], versions: Mapping[str, str]
+) -> Iterator[str]:
+    """The text of a document, record after record: however many there are, one is in memory."""
+    head = json.dumps({**versions, "settings": settings, "pairs": []}, indent=2, allow_nan=False)
+    yield head.removesuffix("]\n}")
+    separator = "\n"
+    for record in records:
+        yield separator + textwrap.indent(json.dumps(record, indent=2, allow_nan=False), "    ")
+        separator = ",\n"
+    yield "]\n}\n" if separator == "\n" else "\n  ]\n}\n"
+
+
+def csv_parts(records: Iterable[Mapping[str, Any]]) -> Iterator[str]:
+    """Numbers at full precision with a decimal point, whatever the locale; fields that failed are empty."""
+    names = ("id", "reference", "distorted", *SHOWN, "error")
+    yield _csv_line(names)
+    for record in records:
+        values = (record[name] for name in names)
+        yield _csv_line("" if value is None else repr(value) if isinstance(value, float) else value for value in values)
+
+
+def table_parts(records: Iterable[Mapping[str, Any]]) -> Iterator[str]:
+    """An aligned table, one row a record; goes through the records twice."""
+    header = ("id", *SHOWN)
+    widths = [len(name) for name in header]
+    for record in records:
+        widths = [max(width, len(cell)) for width, cell in zip(widths, _cells(record), strict=True)]
+    for cells in chain([header], map(_cells, records)):
+        aligned = (cell.rjust(width) for cell, width in zip(cells[1:], widths[1:], strict=True))
+        yield "  ".join((cells[0].ljust(widths[0]), *aligned)).rstrip() + "\n"
+
+
+def pair_record(pair: PairScore) -> dict[str, Any]:
+    """A pair as plain values for JSON, by which all outputs are made; its id is the name of what was scored."""
     return {
+        "id": pair.distorted,
         "reference": pair.reference,
         "distorted": pair.distorted,
         **_columns(pair.scores),
@@ -97,6 +106,20 @@ def _pair_dict(pair: PairScore) -> dict[str, Any]:
         "warnings": list(pair.warnings),
         "error": pair.error,
     }
+
+
+def _cells(record: Mapping[str, Any]) -> tuple[str, ...]:
+    if record["FMQM"] is None:
+        return (record["id"], *["-"] * len(SHOWN))
+    stderr = record["stderr"]
+    spread = {name: f" ±{stderr[name]:.4f}" if stderr else "" for name in SHOWN}
+    return (record["id"], *(f"{record[name]:.4f}{spread[name]}" for name in SHOWN))
+
+
+def _csv_line(values: Iterable[str]) -> str:
+    out = io.StringIO()
+    csv.writer(out, lineterminator="\n").writerow(values)
+    return out.getvalue()
 
 
 def _columns(values: Floats | None) -> dict[str, float | None]:

@@ -29,7 +29,10 @@ from .script import (
     write_torus,
 )
 
-PAIR_KEYS = ["reference", "distorted", *COLUMNS, "stderr", "patches", "samples", "seconds", "warnings", "error"]
+PAIR_KEYS = [
+    "id", "reference", "distorted", *COLUMNS, "stderr", "patches", "samples", "seconds", "warnings", "error",
+    "settings", "fail_under",
+]  # fmt: skip
 SETTING_FLAGS = [
     "samples", "patches", "scored-patches", "sigma", "radius", "gradient-radius", "normal-threshold",
     "tangent-threshold", "color-units", "centers", "color-space", "pooling", "seed", "repeats",
@@ -85,7 +88,7 @@ def said(stderr: str) -> list[str]:
 
 def test_table(whole: Path) -> None:
     header, row = (line.split() for line in (whole / "stdout").read_text(encoding="utf-8").splitlines())
-    assert header == ["distorted", *COLUMNS] and row[0] == "shaken.obj"
+    assert header == ["id", *COLUMNS] and row[0] == "shaken.obj"
     pair = read_json(whole / "all.json")["pairs"][0]
     assert row[1:] == [f"{value:.4f}" for value in numbers(pair)]
 
@@ -126,10 +129,10 @@ def test_seconds_add_up(whole: Path) -> None:
 
 def test_csv(whole: Path) -> None:
     rows = list(csv.reader((whole / "all.csv").read_text(encoding="utf-8").splitlines()))
-    assert rows[0] == ["reference", "distorted", *COLUMNS, "error"]
+    assert rows[0] == ["id", "reference", "distorted", *COLUMNS, "error"]
     pair = read_json(whole / "all.json")["pairs"][0]
     assert len(rows) == 2
-    assert rows[1] == ["ref.obj", "shaken.obj", *(repr(value) for value in numbers(pair)), ""]
+    assert rows[1] == ["shaken.obj", "ref.obj", "shaken.obj", *(repr(value) for value in numbers(pair)), ""]
 
 
 def test_fields_have_the_promised_names_types_and_shapes(whole: Path) -> None:

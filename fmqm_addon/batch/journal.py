@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What has been scored, on disk as it comes: one line of JSON for each event, each forced to the disk.
+
+{"start": key} before a pair, {"done": key, "pair": record} after it; "lost": true where a pair ended its worker.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
+from typing import IO, Any
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
+
+from ..blender.spec import split_spec
+from ..metric.errors import FileError
+from .rows import Options, Row
+
+
+def row_key(row: Row, options: Options, versions: Mapping[str, str]) -> str:
+    """What a score depends on: the row, all options, the program, and size and time of the files that it names.
+
+    Its id and threshold are not part of it: they can change without a new score.
+    """
+    told = asdict(row) | {"folder": os.path.abspath(row.folder), "id": None, "fail_under": None}
+    files = [split_spec(row.path(name))[0] for name in (row.reference, row.distorted)]
+    stamps = [_stamp(path) for path in (*files, row.path(row.ref_texture), row.path(row.texture))]
+    text = json.dumps([told, options.as_dict(), dict(versions), stamps], sort_keys=True)
+    return hashlib.blake2b(text.encode("utf-8", "surrogatepass"), digest_size=16).hexdigest()
+
+
+def _stamp(path: str) -> tuple[int, int] | None:
+    try:
+        found = os.stat(path)
+    except (OSError, ValueError):
+        return None
+    return found.st_size, found.st_mtime_ns
+
+
+class Journal:
+    """Records by key, in a file; in memory only where each of them begins.
+
+    Args:
+        path: the file; None is a temporary one without a name.
+        resume: go on with what the file holds, less a last line that was torn; else it is replaced.
+
+    Raises:
+        FileError: it cannot be written.
+    """
+
+    def __init__(self, path: str | None = None, resume: bool = False) -> None:
+        self.path = path
+        self._offsets: dict[str, int] = {}
+        self._lost: set[str] = set()
+        try:
+            self._file: IO[bytes] = open(path, "ab+", 0) if path else tempfile.TemporaryFile(buffering=0)  # noqa: SIM115
+            _lock(self._file, path)
+            if not resume:
+                self._file.truncate(0)
+            self._file.seek(0)
+            self._read()
+        except OSError as error:
+            raise FileError(f"{path}: the journal cannot be written ({error.strerror})") from error
+
+    def __contains__(self, key: object) -> bool:
+        """Whether there is a record to stand by: a pair that ended its worker is worth another run."""
+        return key in self._offsets and key not in self._lost
+
+    def start(self, key: str) -> None:
+        self._append({"start": key})
+
+    def done(self, key: str, record: Mapping[str, Any], lost: bool = False) -> None:
+        end = self._append({"done": key, **({"lost": True} if lost else {}), "pair": record})
+        self._note(key, end, lost)
+
+    def record(self, key: str) -> dict[str, Any]:
+        """Raises KeyError if there is none."""
+        self._file.seek(self._offsets[key])
+        with os.fdopen(os.dup(self._file.fileno()), "rb") as reader:
+            pair: dict[str, Any] = json.loads(reader.readline())["pair"]
+        return pair
+
+    def close(self) -> None:
+        self._file.close()
+
+    def remove(self) -> None:
+        self.close()
+        if self.path:
+            os.remove(self.path)
+
+    def _read(self) -> None:
+        offset = 0
+        with os.fdopen(os.dup(self._file.fileno()), "rb") as reader:
+            for line in reader:
+                if not line.endswith(b"\n"):
+                    self._file.truncate(offset)
+                    break
+                event = parse_line(line)
+                if "done" in event:
+                    self._note(event["done"], offset, "lost" in event)
+                offset += len(line)
+
+    def _note(self, key: str, offset: int, lost: bool) -> None:
+        self._offsets[key] = offset
+        if lost:
+            self._lost.add(key)
+        else:
+            self._lost.discard(key)
+
+    def _append(self, event: Mapping[str, Any]) -> int:
+        """Where the line begins. Written in one piece: a reader never sees the middle of two."""
+        try:
+            begin = self._file.seek(0, os.SEEK_END)
+            self._file.write(json.dumps(event, allow_nan=False).encode() + b"\n")
+            if self.path:
+                os.fsync(self._file.fileno())
+        except OSError as error:
+            raise FileError(f"{self.path}: the journal cannot be written ({error.strerror})") from error
+        return begin
+
+
+def _lock(file: IO[bytes], path: str | None) -> None:
+    """Keeps a second run out, where the system can; the lock goes with the process."""
+    if fcntl is None:
+        return
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        raise FileError(f"{path}: another run is writing this journal; wait for it or name another") from error
+    except OSError:
+        pass  # a file system without locks
+
+
+def parse_line(line: bytes) -> dict[str, Any]:
+    """An event; {} where a power cut left something else."""
+    try:
+        event = json.loads(line)
+    except ValueError:
+        return {}
+    return event if isinstance(event, dict) else {}
+
+
+class Records:
+    """The records of rows in their order, as the outputs want them; read anew each time, so that none is kept."""
+
+    def __init__(self, rows: Sequence[Row], keys: Sequence[str], journal: Journal, fail_under: float | None) -> None:
+        self._rows = rows
+        self._keys = keys
+        self._journal = journal
+        self._fail_under = fail_under
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        for row, key in zip(self._rows, self._keys, strict=True):
+            limit = self._fail_under if row.fail_under is None else row.fail_under
+            own = {name: str(value) if value == float("inf") else value for name, value in row.settings}
+            yield self._journal.record(key) | {"id": row.id, "settings": own, "fail_under": limit}

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is to be scored: pairs, and the options that all of them share."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+from ..metric.settings import Settings
+
+
+@dataclass(frozen=True)
+class Options:
+    """How all pairs of a run are scored.
+
+    Attributes:
+        settings: of the metric, before a row's own. repeats: seeds. space, match_scale: as blender.space.place.
+    """
+
+    settings: Settings
+    repeats: int = 1
+    space: str = "auto"
+    match_scale: bool = False
+
+    def settings_of(self, row: Row) -> Settings:
+        return replace(self.settings, **dict(row.settings))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values under the names of the command line's flags."""
+        rest = {"repeats": self.repeats, "space": self.space, "match_scale": self.match_scale}
+        return self.settings.as_dict() | rest
+
+
+@dataclass(frozen=True)
+class Row:
+    """A pair to score.
+
+    Attributes:
+        id: its name in the outputs, unique in a run.
+        reference, distorted: as the user named them; a path, or "file.blend:Object name".
+        ref_texture, texture: images that replace the base color of the whole; "" leaves it.
+        fail_under: its own threshold, in [0, 1]; None takes the run's.
+        settings: names and values that differ from the run's.
+        folder: what relative paths are relative to; "" is the working directory.
+    """
+
+    id: str
+    reference: str
+    distorted: str
+    ref_texture: str = ""
+    texture: str = ""
+    fail_under: float | None = None
+    settings: tuple[tuple[str, Any], ...] = ()
+    folder: str = ""
+
+    def path(self, name: str) -> str:
+        """Where a named file is, from the working directory; "" stays ""."""
+        return os.path.join(self.folder, name) if name else ""
+
+    @property
+    def preparation(self) -> tuple[Any, ...]:
+        """Pairs that are equal in it share the preparation of their reference."""
+        return (self.path(self.reference), self.path(self.ref_texture), self.settings)
+
+
+@dataclass(frozen=True)
+class Task:
+    """A row that waits to be scored, and the key of its record in the journal."""
+
+    key: str
+    row: Row
+
+    def as_dict(self) -> dict[str, Any]:
+        return {"key": self.key, "row": asdict(self.row)}
+
+
+def task_of(plain: dict[str, Any]) -> Task:
+    """The inverse of Task.as_dict, after a way through JSON."""
+    row = plain["row"]
+    return Task(plain["key"], Row(**row | {"settings": tuple((name, value) for name, value in row["settings"])}))
+
+
+def grouped(tasks: Iterable[Task]) -> list[list[Task]]:
+    """By what they prepare, in the order in which that first comes."""
+    groups: dict[tuple[Any, ...], list[Task]] = {}
+    for task in tasks:
+        groups.setdefault(task.row.preparation, []).append(task)
+    return list(groups.values())

@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Scoring rows in this process, one after the other; pairs that share a reference share its preparation."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+from ..metric.errors import FMQMError
+from ..report.pair import PairScore, pair_record
+from .journal import Journal
+from .log import Log
+from .rows import Options, Row, Task, grouped, task_of
+from .workers import end_when_stuck, end_with_parent, journal_of
+
+if TYPE_CHECKING:
+    from ..blender.measure import Measurement
+    from ..blender.space import Placed
+    from ..metric.score import Result, Stepper
+    from ..metric.surface import Surface
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Scored:
+    """The pair that was scored last, for its fields and picture."""
+
+    reference: Surface
+    distorted: Surface
+    result: Result
+
+
+def score_tasks(
+    tasks: Sequence[Task], options: Options, journal: Journal, log: Log, before_each: Callable[[], None] | None = None
+) -> Scored | None:
+    """Scores all into the journal; a pair that fails does not stop the others. None if the last one failed.
+
+    Args:
+        log: counts units_of(tasks). before_each: called before each pair.
+    """
+    scorer = _Scorer(options, journal, log, before_each)
+    for group in grouped(tasks):
+        scorer.score(group)
+    log.end()
+    return scorer.last
+
+
+def units_of(tasks: Sequence[Task]) -> int:
+    """Of work: each pair, and each reference."""
+    return len(tasks) + len(grouped(tasks))
+
+
+def work_off(shard: str, options: Options, stuck_after: float) -> None:
+    """What a worker does: scores the tasks of a shard into the journal beside it, as long as its parent lives."""
+    end_with_parent()
+    tasks = [task_of(plain) for plain in json.loads(Path(shard).read_text(encoding="utf-8"))]
+    journal = Journal(journal_of(shard))
+    silent = Log("", units_of(tasks), len(tasks), silent=True)
+    score_tasks(tasks, options, journal, silent, lambda: end_when_stuck(stuck_after))
+    journal.close()
+
+
+class _Scorer:
+    """Where the work is, group after group."""
+
+    def __init__(self, options: Options, journal: Journal, log: Log, before_each: Callable[[], None] | None) -> None:
+        self.last: Scored | None = None
+        self._options = options
+        self._journal = journal
+        self._log = log
+        self._before_each = before_each
+        self._units = 0  # of work done
+        self._seconds: dict[str, float] = {}  # of the pair at hand, by stage
+
+    def score(self, group: Sequence[Task]) -> None:
+        """Prepares the reference that the tasks share, and scores them one by one."""
+        from ..blender.measure import Measurement
+
+        options, row = self._options, group[0].row
+        self._begin(group[0])
+        began = time.perf_counter()
+        failure: FMQMError | None = None
+        try:
+            reference = self._load(row, row.reference, row.ref_texture)
+            measurement = Measurement(reference.world(), options.settings_of(row), options.repeats)
+            self._work(measurement.prepare(), "preparing the reference")
+        except FMQMError as error:
+            failure = error
+        self._units += 1
+        for task in group:
+            if task is not group[0]:
+                self._begin(task)
+            pair = PairScore(task.row.reference, task.row.distorted)
+            self.last = None
+            try:
+                if failure is not None:
+                    raise failure
+                pair = self._compare(pair, task.row, reference, measurement)
+            except FMQMError as error:
+                pair = replace(pair, error=str(error))
+                self._log.say(str(error))
+            now = time.perf_counter()
+            record = pair_record(replace(pair, seconds={**self._seconds, "total": now - began}))
+            self._journal.done(task.key, record)
+            began = now
+            self._units += 1
+            self._log.finished += 1
+
+    def _begin(self, task: Task) -> None:
+        """Before the reference is loaded too, so that a reference that ends the process names its first pair."""
+        if self._before_each is not None:
+            self._before_each()
+        self._journal.start(task.key)
+        self._seconds = {}
+
+    def _compare(self, pair: PairScore, row: Row, reference: Placed, measurement: Measurement) -> PairScore:
+        from ..blender.space import place
+
+        loaded = self._load(row, row.distorted, row.texture)
+        placement = place(reference, loaded, self._options.space, self._options.match_scale)
+        compared = self._work(measurement.compare(placement.mesh), f"scoring {row.id}")
+        result = compared.result
+        self.last = Scored(measurement.reference, compared.distorted, result)
+        return replace(
+            pair,
+            scores=compared.scores,
+            stderr=compared.stderr,
+            patches=len(result.patches),
+            samples=len(result.samples.positions),
+            space=placement.label,
+            warnings=(*placement.notes, *placement.warnings, *result.warnings),
+        )
+
+    def _load(self, row: Row, name: str, image: str) -> Placed:
+        from ..blender.files import load_placed
+        from ..blender.material import load_texture
+
+        self._log.show(self._units, f"loading {name}")
+        began = time.perf_counter()
+        try:
+            return load_placed(row.path(name), load_texture(row.path(image)) if image else None)
+        finally:
+            self._spent("load", time.perf_counter() - began)
+
+    def _work(self, stepper: Stepper[T], text: str) -> T:
+        """Runs a stepper to its end with its progress shown and its seconds added up by stage."""
+        while stepper.step():
+            self._log.show(self._units + stepper.progress.done, text)
+        for stage, seconds in stepper.seconds.items():
+            self._spent(stage, seconds)
+        return stepper.result
+
+    def _spent(self, stage: str, seconds: float) -> None:
+        self._seconds[stage] = self._seconds.get(stage, 0.0) + seconds

@@ -1,0 +1,287 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pairs scored by several processes of the same program, each on a shard, watched by this one.
+
+A worker reads its shard, a JSON list of tasks, and writes a journal beside it, which is followed here. There is no
+other talk between them: a worker that dies, hangs or swells is ended, and the rest of its shard goes to the next.
+"""
+
+from __future__ import annotations
+
+import faulthandler
+import json
+import math
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections import Counter, deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..metric.errors import FMQMError
+from ..report.pair import PairScore, pair_record
+from .journal import Journal, parse_line
+from .log import Log
+from .rows import Task, grouped
+
+TRIES = 2  # a pair that ends its worker is tried once more
+_POLL = 0.1  # seconds between looks at the workers
+_WORTHWHILE = 5.0  # seconds of work that a worker is started for, at least
+_BARREN = 3  # workers in a row that end before their first pair: it is not the pairs
+_GRACE = 30.0  # seconds after its time-out until a stuck worker ends itself, should nobody do it
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a pair may take: seconds, and bytes of resident memory of its worker (None: any)."""
+
+    timeout: float = 3600.0
+    memory: float | None = None
+
+
+def journal_of(shard: str) -> str:
+    return f"{shard}l"  # .json to .jsonl
+
+
+def score_with_workers(
+    tasks: Sequence[Task],
+    command: Sequence[str],
+    folder: Path,
+    jobs: int,
+    limits: Limits,
+    journal: Journal,
+    log: Log,
+) -> None:
+    """Scores all tasks into the journal.
+
+    Args:
+        command: a worker's, to which the path of a shard is added.
+        folder: for shards and the workers' journals and temporary files.
+        log: counts the pairs.
+
+    Raises:
+        FMQMError: workers end before they score anything, or their memory cannot be watched.
+    """
+    if limits.memory is not None and resident_bytes(os.getpid()) is None:
+        raise FMQMError("--memory-limit: neither /proc nor ps tells the memory of a process here; leave it out")
+    pool = _Pool(tasks, command, folder, limits, journal, log)
+    try:
+        while pool.waiting or pool.workers:
+            pool.look_after(jobs)
+            time.sleep(_POLL)
+    finally:
+        pool.stop()
+    log.end()
+
+
+def adopt(folder: Path, journal: Journal) -> None:
+    """Takes over what workers wrote whose parent was killed before it read it, and removes their folder."""
+    for path in sorted(folder.glob("shard-*.jsonl")):
+        for event in map(parse_line, path.read_bytes().splitlines()):
+            if "done" in event and event["done"] not in journal:
+                journal.done(event["done"], event["pair"])
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+class _Pool:
+    """The tasks that wait and the workers that are at it."""
+
+    def __init__(
+        self, tasks: Sequence[Task], command: Sequence[str], folder: Path, limits: Limits, journal: Journal, log: Log
+    ) -> None:
+        self.waiting = deque(task for group in grouped(tasks) for task in group)
+        self.workers: list[_Worker] = []
+        self._command = command
+        self._folder = folder
+        self._limits = limits
+        self._journal = journal
+        self._log = log
+        self._failed: Counter[str] = Counter()  # tries, by key
+        self._began = time.monotonic()
+        self._started = 0  # workers
+        self._barren = 0  # workers in a row that scored nothing
+
+    def look_after(self, jobs: int) -> None:
+        """Starts workers where there is room, takes what they have done, and replaces those that failed."""
+        while self.waiting and len(self.workers) < jobs:
+            share = [self.waiting.popleft() for _ in range(self._share(jobs))]
+            self._started += 1
+            self.workers.append(_Worker(self._command, self._folder / f"shard-{self._started}.json", share))
+        for worker in list(self.workers):
+            trouble = worker.trouble(self._limits)
+            over = worker.ended or trouble != ""
+            if over:
+                worker.end()
+            self._take_news(worker)
+            if over:
+                self.workers.remove(worker)
+                self._bury(worker, trouble)
+
+    def stop(self) -> None:
+        """Ends all workers, and takes what they have done."""
+        for worker in self.workers:
+            worker.end()
+            self._take_news(worker)
+
+    def _share(self, jobs: int) -> int:
+        """Much at first, less towards the end, so that all finish together; but worth the start of a worker."""
+        fair = len(self.waiting) / (jobs - len(self.workers))
+        if not self._log.finished:
+            return math.ceil(fair * 0.75)
+        seconds = (time.monotonic() - self._began) * jobs / self._log.finished
+        return min(len(self.waiting), math.ceil(max(len(self.waiting) / jobs / 2, _WORTHWHILE / seconds)))
+
+    def _take_news(self, worker: _Worker) -> None:
+        for event in worker.news():
+            if "start" in event:
+                self._journal.start(event["start"])
+            elif "done" in event:
+                self._finish(event["done"], event["pair"])
+
+    def _finish(self, key: str, record: Mapping[str, Any], lost: bool = False) -> None:
+        self._barren = 0
+        self._journal.done(key, record, lost)
+        self._log.scored(record)
+
+    def _bury(self, worker: _Worker, trouble: str) -> None:
+        """What it left goes to the next; the pair it failed at is tried once more, after all others."""
+        rest = list(worker.tasks.values())
+        if not rest:
+            return
+        why = trouble or worker.farewell()
+        failed = worker.tasks.get(worker.at)
+        if failed is None:
+            self._barren += 1
+            if self._barren == _BARREN:
+                raise FMQMError(f"workers end before their first pair ({worker.last_words() or why})")
+            self.waiting.extendleft(reversed(rest))
+            return
+        rest.remove(failed)
+        self.waiting.extendleft(reversed(rest))
+        self._failed[failed.key] += 1
+        name = failed.row.distorted
+        if self._failed[failed.key] < TRIES:
+            self._log.say(f"{name}: {why}; it will be tried once more")
+            self.waiting.append(failed)
+        else:
+            lost = PairScore(failed.row.reference, name, error=f"{name}: {why}, {TRIES} times; look at it alone")
+            self._finish(failed.key, pair_record(lost), lost=True)
+
+
+class _Worker:
+    """A process, its shard, and what its journal has told so far.
+
+    Attributes:
+        tasks: those it has not done, by key. at: key of the one it is at, "" before the first and between two.
+    """
+
+    def __init__(self, command: Sequence[str], shard: Path, tasks: Sequence[Task]) -> None:
+        self.tasks = {task.key: task for task in tasks}
+        self.at = ""
+        self._shard = shard
+        self._read = 0  # bytes of its journal
+        self._heard = time.monotonic()
+        shard.write_text(json.dumps([task.as_dict() for task in tasks]), encoding="utf-8")
+        with open(shard.with_suffix(".log"), "wb") as log:
+            # Its input is a pipe that nothing is written to: it closes when this process ends, however it does.
+            # In a session of its own, Ctrl-C reaches only this process, which ends it.
+            self._process = subprocess.Popen(
+                [*command, str(shard)],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.DEVNULL,
+                stderr=log,
+                env=os.environ | dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(shard.parent.resolve())),
+                start_new_session=True,
+            )
+
+    @property
+    def ended(self) -> bool:
+        return self._process.poll() is not None
+
+    def trouble(self, limits: Limits) -> str:
+        """Why it must be ended; "" if all is well."""
+        if self.ended:
+            return ""
+        if time.monotonic() - self._heard > limits.timeout:
+            return f"not scored within {limits.timeout:g} s (--timeout)"
+        if limits.memory is not None and (resident_bytes(self._process.pid) or 0) > limits.memory:
+            return f"scoring it takes more than {limits.memory / 1e9:g} GB of memory (--memory-limit)"
+        return ""
+
+    def news(self) -> list[dict[str, Any]]:
+        """The events that its journal tells since the last time; a line that is still being written comes later."""
+        try:
+            with open(journal_of(str(self._shard)), "rb") as file:
+                file.seek(self._read)
+                written = file.read()
+        except FileNotFoundError:
+            return []
+        whole = written[: written.rfind(b"\n") + 1]
+        self._read += len(whole)
+        events = [parse_line(line) for line in whole.splitlines()]
+        for event in events:
+            self._heard = time.monotonic()
+            self.at = event.get("start", "")
+            self.tasks.pop(event.get("done", ""), None)
+        return events
+
+    def end(self) -> None:
+        """Kills it if it lives, and waits for its end."""
+        self._process.kill()
+        self._process.wait()
+        if self._process.stdin:
+            self._process.stdin.close()
+
+    def farewell(self) -> str:
+        """How it ended by itself."""
+        code = self._process.returncode
+        if code >= 0:
+            return f"its worker ended with exit code {code}"
+        return f"its worker died ({signal.Signals(-code).name})"
+
+    def last_words(self) -> str:
+        lines = self._shard.with_suffix(".log").read_text(encoding="utf-8", errors="replace").split("\n")
+        return next((line.strip() for line in reversed(lines) if line.strip()), "")
+
+
+def resident_bytes(pid: int) -> int | None:
+    """Resident memory of a process; None if it is gone, or this system does not tell."""
+    try:
+        pages = int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1])
+        return pages * os.sysconf("SC_PAGE_SIZE")
+    except (OSError, ValueError, IndexError):
+        pass
+    try:
+        told = subprocess.run(["ps", "-o", "rss=", "-p", str(pid)], capture_output=True, text=True, check=False)
+        return int(told.stdout) * 1024
+    except (OSError, ValueError):
+        return None
+
+
+def end_with_parent() -> None:
+    """Lets this process end as soon as its standard input closes. The thread touches nothing else."""
+
+    def wait() -> None:
+        while os.read(0, 1):
+            pass
+        os._exit(1)
+
+    threading.Thread(target=wait, daemon=True).start()
+
+
+def end_when_stuck(timeout: float) -> None:
+    """Lets this process end some time after the timeout, even where the parent is gone and no Python runs any more."""
+    faulthandler.dump_traceback_later(timeout + _GRACE, exit=True, file=2)
+
+
+def workers_command(script: str, arguments: Sequence[str]) -> list[str]:
+    """This program once more: under Blender if we are, else in this Python. A shard's path follows --worker."""
+    blender = sys.modules.get("bpy")
+    program = blender.app.binary_path if blender is not None else ""
+    start = [program, "-b", "-q", "--python", script, "--"] if program else [sys.executable, script]
+    return [*start, *arguments, "--worker"]
