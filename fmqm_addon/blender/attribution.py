@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whose loss it is, geometry's or the texture's: two more scores of a pair, each with only one of them distorted.
+
+    geometry: the distorted mesh, painted as the reference.
+    texture: the reference's mesh, painted as the distorted.
+
+Painting is exchanging materials where the two meshes lie on their textures alike. Where they do not (unwrapped anew,
+repacked, baked) a point has the color of the other surface's nearest point. The paper has none of this.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from ..metric.color import Material
+from ..metric.errors import MeshError
+from ..metric.fields import closest_on
+from ..metric.score import COLUMNS, Progress, Stepper, Work
+from ..metric.spatial import Floats
+from ..metric.surface import MeshArrays, Surface
+from .measure import Comparison, Measurement
+
+How = Literal["materials", "nearest points"]
+
+AGREES = 0.02  # of the texture's side: what noise and decimation shift texture coordinates by at most
+MOST = 0.8  # of the samples; seams and far-moved parts are the rest
+LITTLE = 0.02  # loss of FMQM that is not worth asking whose it is
+CLEARLY = 2.0  # one loss is this many times the other: it is most of it
+
+_FMQM = COLUMNS.index("FMQM")
+
+
+@dataclass(frozen=True)
+class Attribution:
+    """Parts of the loss 1 - FMQM of a pair; they do not add up to it, since both lower the color features.
+
+    Attributes:
+        geometry_loss, texture_loss: 1 - FMQM with only geometry or only texture distorted, in [0, 1].
+        how: what painting was: exchanging materials, or taking colors from nearest points.
+    """
+
+    geometry_loss: float
+    texture_loss: float
+    how: How
+
+    @property
+    def phrase(self) -> str:
+        """For people: "most of the loss is the texture"."""
+        geometry, texture = self.geometry_loss, self.texture_loss
+        if max(geometry, texture) < LITTLE:
+            return "there is hardly any loss"
+        if geometry >= CLEARLY * texture:
+            return "most of the loss is the geometry"
+        if texture >= CLEARLY * geometry:
+            return "most of the loss is the texture"
+        return "geometry and texture share the loss"
+
+
+def attribute(
+    measurement: Measurement, reference: MeshArrays, distorted: MeshArrays, compared: Comparison
+) -> Stepper[Attribution]:
+    """Two more comparisons on the same samples.
+
+    Args:
+        measurement: that reference was prepared in.
+        reference, distorted: as they were measured, in the reference's world.
+        compared: their comparison.
+    """
+    return Stepper(_attribute(measurement, reference, distorted, compared))
+
+
+def _attribute(
+    measurement: Measurement, reference: MeshArrays, distorted: MeshArrays, compared: Comparison
+) -> Work[Attribution]:
+    yield Progress("attribution", 0.0)
+    theirs, own = _counterparts(distorted, reference), _counterparts(reference, distorted)
+    how: How = "nearest points"
+    if theirs is not None and own is not None and _lie_alike(measurement.reference, compared):
+        how = "materials"
+        painted = replace(distorted, materials=theirs), replace(reference, materials=own)
+    else:
+        painted = (
+            _painted_from(distorted, measurement.reference),
+            _painted_from(reference, compared.distorted),
+        )
+    losses = []
+    for mesh in painted:
+        comparing = measurement.compare(mesh)
+        while comparing.step():
+            yield Progress("attribution", 0.5 * len(losses) + 0.5 * comparing.progress.done)
+        losses.append(max(0.0, 1.0 - float(comparing.result.scores[_FMQM])))
+    return Attribution(losses[0], losses[1], how)
+
+
+def _counterparts(mesh: MeshArrays, other: MeshArrays) -> tuple[Material, ...] | None:
+    """For each material of the mesh the other's of its name, or the one at its place where there are equally many."""
+    if mesh.corners.shape[2] != other.corners.shape[2]:
+        return None
+    by_name = {material.name: material for material in other.materials}
+    if len(by_name) == len(other.materials) and all(material.name in by_name for material in mesh.materials):
+        return tuple(by_name[material.name] for material in mesh.materials)
+    return other.materials if len(mesh.materials) == len(other.materials) else None
+
+
+def _lie_alike(reference: Surface, compared: Comparison) -> bool:
+    """Whether texture coordinates, and what else materials read, agree between the points nearest to a sample."""
+    result = compared.result
+    values = [
+        _values_at(surface, fields.nearest, fields.triangle)
+        for surface, fields in ((reference, result.ref), (compared.distorted, result.dist))
+    ]
+    apart = np.abs(values[0] - values[1]).max(axis=1, initial=0.0)
+    return float(np.mean(apart <= AGREES)) >= MOST
+
+
+def _values_at(surface: Surface, points: Floats, triangle: np.ndarray) -> Floats:
+    """(N, K) corner values at points on (N,) triangles."""
+    _, weights = closest_on(surface, points, triangle)
+    return np.einsum("nk,nkc->nc", weights, surface.corners[triangle])
+
+
+def _painted_from(mesh: MeshArrays, other: Surface) -> MeshArrays:
+    """The mesh with the colors of another surface's nearest points."""
+    material = Material(mesh.name, NearestColor(other))
+    corners = np.asarray(mesh.positions, np.float64)[mesh.triangles]
+    return replace(mesh, corners=corners, material=np.zeros(len(mesh.triangles), np.int64), materials=(material,))
+
+
+@dataclass(frozen=True)
+class NearestColor:
+    """The color of a surface at the point nearest to a place, which the three corner values are, in its world."""
+
+    surface: Surface
+
+    def lookup(self, values: Floats) -> Floats:
+        points = self.surface.frame.enter(values)
+        triangle = self.surface.query.nearest(points, None)
+        _, weights = closest_on(self.surface, points, triangle)
+        return self.surface.color_at(triangle, weights)
