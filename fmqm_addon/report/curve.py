@@ -65,7 +65,7 @@ def curve_svg(levels: Sequence[Level], cost: str) -> str:
     for level in ordered:
         # Below to the right, or above to the left: there the curve, which rises, is not.
         on_left = x(level.cost) < (LEFT + WIDTH - RIGHT) / 2
-        shift, drop, anchor = (8, 17, "start") if on_left else (4, -9, "end")
+        shift, drop, anchor = (8, 17, "start") if on_left else (-7, -8, "end")
         kind = ' class="reference"' if level.is_reference else ""
         name = escape(shorten(level.name, lambda text: len(text) <= LABEL))
         parts.append(

@@ -7,7 +7,8 @@ It needs no network and no server. Names come from strangers' files: every text 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -15,9 +16,10 @@ from urllib.parse import quote
 
 import numpy as np
 
+from ..metric.spatial import Floats
 from .colormap import NO_PATCH, score_colors
 from .curve import Level, curve_svg
-from .files import write_text
+from .files import write_parts
 from .pair import SHOWN
 
 PAGE = "index.html"
@@ -26,34 +28,39 @@ MISSING = "–"
 # Nothing but what lies beside the page is ever loaded, whatever a name might hold.
 POLICY = "default-src 'none'; img-src 'self' file: data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
 
+_TABLE = (
+    '<section class="card scroll" tabindex="0" role="region" aria-label="All pairs"><table class="scores"><thead><tr>'
+    + "".join(
+        f'<th scope="col"><button type="button">{name}</button></th>'
+        for name in ("Pair", *SHOWN, "Triangles", "Texture MB")
+    )
+    + "</tr></thead><tbody>"
+)
+
 Record = Mapping[str, Any]
 
 
 def write_page(
-    folder: str, records: Sequence[Record], settings: Mapping[str, Any], versions: Mapping[str, str]
+    folder: str, records: Iterable[Record], settings: Mapping[str, Any], versions: Mapping[str, str]
 ) -> None:
     """Writes index.html into the folder of a report.
 
     Args:
-        records: the pairs as JSON has them, in their order. Besides the scores each may hold "id", "trust", and
-            "pictures", which is what write_pair_pictures returned.
+        records: the pairs as JSON has them, in their order; gone through more than once. Besides the scores each
+            may hold "trust", and "pictures", which is what write_pair_pictures returned.
         settings, versions: as JSON has them.
 
     Raises:
         FileError: it cannot be written; what stood there is left as it was.
     """
-    write_text(os.path.join(folder, PAGE), page_html(records, settings, versions))
+    write_parts(os.path.join(folder, PAGE), page_parts(records, settings, versions))
 
 
-def page_html(records: Sequence[Record], settings: Mapping[str, Any], versions: Mapping[str, str]) -> str:
-    """The page as text; the arguments are those of write_page."""
+def page_parts(records: Iterable[Record], settings: Mapping[str, Any], versions: Mapping[str, str]) -> Iterator[str]:
+    """The text of the page; the arguments are those of write_page."""
     beside = Path(__file__).parent
-    numbered = list(enumerate(records, 1))
-    groups: dict[str, list[tuple[int, Record]]] = {}
-    for number, record in numbered:
-        groups.setdefault(record["reference"], []).append((number, record))
-    sections = "".join(_reference(reference, pairs) for reference, pairs in groups.items())
-    return f"""<!DOCTYPE html>
+    overview = _overview(records)
+    yield f"""<!DOCTYPE html>
 <html lang="en">
 <head>
 <meta charset="utf-8">
@@ -67,12 +74,21 @@ def page_html(records: Sequence[Record], settings: Mapping[str, Any], versions: 
 <body>
 <header>
 <h1>FMQM report</h1>
-<p class="faint">{_summary(records, len(groups))}</p>
+<p class="faint">{_summary(overview)}</p>
 </header>
 <main>
-{_table(numbered)}
-{sections}
-{_settings(settings, versions)}
+{_TABLE}
+"""
+    for number, record in enumerate(records, 1):
+        yield _row(number, record)
+    yield "</tbody></table></section>\n"
+    reference = None
+    for number, record in enumerate(records, 1):
+        if record["reference"] != reference:
+            reference = record["reference"]
+            yield f"<h2>{_text(reference)}</h2>\n{_curves(reference, overview.chains.pop(reference, []))}"
+        yield _pair(number, record)
+    yield f"""{_settings(settings, versions)}
 </main>
 <script>
 {(beside / "page.js").read_text(encoding="utf-8")}</script>
@@ -81,49 +97,75 @@ def page_html(records: Sequence[Record], settings: Mapping[str, Any], versions: 
 """
 
 
-def _summary(records: Sequence[Record], references: int) -> str:
-    scored = [record for record in records if record["FMQM"] is not None]
-    said = f"{_count(len(records), 'pair')}, {_count(references, 'reference')}."
-    if scored:
-        worst = min(scored, key=lambda record: record["FMQM"])
-        said += f" Lowest FMQM: {worst['FMQM']:.4f}, {_name(worst)}."
-    if len(scored) < len(records):
-        said += f' <strong class="bad">{len(records) - len(scored)} not scored.</strong>'
+@dataclass(frozen=True)
+class _Cost:
+    """A scored pair's points on the curves; triangles and texture_mb are those of reference and distorted."""
+
+    name: str
+    score: float
+    triangles: tuple[float, float]
+    texture_mb: tuple[float, float]
+
+
+@dataclass
+class _Overview:
+    """What is known of all pairs together.
+
+    Attributes:
+        pairs: how many. scored: of these. lowest: score and name. chains: the scored pairs of each reference.
+    """
+
+    pairs: int = 0
+    scored: int = 0
+    lowest: tuple[float, str] = (1.0, "")
+    chains: dict[str, list[_Cost]] = field(default_factory=dict)
+
+
+def _overview(records: Iterable[Record]) -> _Overview:
+    all_pairs = _Overview()
+    for record in records:
+        chain = all_pairs.chains.setdefault(record["reference"], [])
+        all_pairs.pairs += 1
+        score, name = record["FMQM"], _name(record)
+        if score is None:
+            continue
+        all_pairs.scored += 1
+        if score < all_pairs.lowest[0]:
+            all_pairs.lowest = (score, name)
+        pictures = record.get("pictures")
+        if pictures:
+            own, size = (count / MEGABYTE for count in pictures["texture_bytes"])
+            chain.append(_Cost(name, score, tuple(pictures["triangles"]), (own, size)))
+    return all_pairs
+
+
+def _summary(overview: _Overview) -> str:
+    said = f"{_count(overview.pairs, 'pair')}, {_count(len(overview.chains), 'reference')}."
+    score, name = overview.lowest
+    if name:
+        said += f" Lowest FMQM: {score:.4f}, {_text(name)}."
+    if overview.scored < overview.pairs:
+        said += f' <strong class="bad">{overview.pairs - overview.scored} not scored.</strong>'
     return said + " 1 is the same as the reference; compare scores only at equal settings."
 
 
-def _table(numbered: Iterable[tuple[int, Record]]) -> str:
-    heads = "".join(
-        f'<th scope="col"><button type="button">{name}</button></th>'
-        for name in ("Pair", *SHOWN, "Triangles", "Texture MB")
-    )
-    rows = "".join(_row(number, record) for number, record in numbered)
-    return (
-        '<section class="card scroll" tabindex="0" role="region" aria-label="All pairs">'
-        f'<table class="scores"><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table></section>'
-    )
-
-
 def _row(number: int, record: Record) -> str:
-    below = f'<span class="faint">of {_base_name(record["reference"])}</span>'
+    below = f'<span class="faint">of {_text(_base_name(record["reference"]))}</span>'
     if record["error"]:
-        below = f'<span class="bad">not scored: {_text(record["error"])}</span>'
-    name = escape(_plain_name(record))
-    cells = [f'<th scope="row" data-value="{name}"><a href="#pair-{number}">{_name(record)}</a><br>{below}</th>']
-    for column in SHOWN:
-        value = record[column]
-        cells.append(
-            f'<td class="number" data-value="{"" if value is None else value}">{_score(record, column)}{_bar(value)}</td>'
-        )
+        below = '<span class="bad">not scored</span>'
+    name = escape(_name(record))
+    cells = [f'<th scope="row" data-value="{name}"><a href="#pair-{number}">{_text(_name(record))}</a><br>{below}</th>']
+    cells += [_cell(record[column], _score(record, column) + _bar(record[column])) for column in SHOWN]
     pictures = record.get("pictures")
     triangles, size = (pictures["triangles"][1], pictures["texture_bytes"][1]) if pictures else (None, None)
-    cells.append(_cell(triangles, "" if triangles is None else f"{triangles:,}"))
-    cells.append(_cell(size, "" if size is None else f"{size / MEGABYTE:.1f}"))
-    return f"<tr>{''.join(cells)}</tr>"
+    cells.append(_cell(triangles, MISSING if triangles is None else f"{triangles:,}"))
+    cells.append(_cell(size, MISSING if size is None else f"{size / MEGABYTE:.1f}"))
+    return f"<tr>{''.join(cells)}</tr>\n"
 
 
-def _cell(value: float | None, text: str) -> str:
-    return f'<td class="number" data-value="{"" if value is None else value}">{text or MISSING}</td>'
+def _cell(value: float | None, shown: str) -> str:
+    """A number of the table, with what it is sorted by."""
+    return f'<td class="number" data-value="{"" if value is None else value}">{shown}</td>'
 
 
 def _score(record: Record, column: str) -> str:
@@ -142,34 +184,34 @@ def _bar(value: float | None) -> str:
     return f'<span class="bar"><span style="width:{100 * value:.1f}%;background:{color}"></span></span>'
 
 
-def _reference(reference: str, pairs: Sequence[tuple[int, Record]]) -> str:
-    articles = "".join(_pair(number, record) for number, record in pairs)
-    return f"<section><h2>{_text(reference)}</h2>{_curves(reference, pairs)}{articles}</section>"
-
-
-def _curves(reference: str, pairs: Sequence[tuple[int, Record]]) -> str:
+def _curves(reference: str, chain: Sequence[_Cost]) -> str:
     """FMQM over triangles and over texture memory, where several were compared with one reference."""
-    chain = [record for _, record in pairs if record["FMQM"] is not None and record.get("pictures")]
     if len(chain) < 2:
         return ""
-    figures = []
-    for key, unit, title in (("triangles", 1, "triangles"), ("texture_bytes", MEGABYTE, "texture MB")):
-        costs = [record["pictures"][key][1] / unit for record in chain]
-        own = chain[0]["pictures"][key][0] / unit
-        if not all(cost > 0 for cost in (own, *costs)):
-            drawn = f'<p class="note">Not every level has a texture: there is no curve against {title}.</p>'
-        elif len({own, *costs}) == 1:
-            drawn = f'<p class="note">All levels have the same: {own:,.4g} {title}.</p>'
-        else:
-            levels = [Level(_plain_name(record), cost, record["FMQM"]) for record, cost in zip(chain, costs, strict=True)]
-            drawn = curve_svg([Level(_plain_base_name(reference), own, 1.0, True), *levels], title)
-        figures.append(f"<div><h4>FMQM against {title}</h4>{drawn}</div>")
-    return f'<div class="card curves">{"".join(figures)}</div>'
+    name = _base_name(reference)
+    triangles = _curve(name, chain, [each.triangles for each in chain], "triangles")
+    texture = _curve(name, chain, [each.texture_mb for each in chain], "texture MB")
+    return f'<div class="card curves">{triangles}{texture}</div>\n'
+
+
+def _curve(reference: str, chain: Sequence[_Cost], costs: Sequence[tuple[float, float]], of: str) -> str:
+    """The costs are those of reference and distorted, for each pair of the chain."""
+    own = costs[0][0]
+    different = {own, *(cost for _, cost in costs)}
+    if len(different) == 1:
+        drawn = f'<p class="note">All levels have the same: {own:,.4g} {of}.</p>'
+    elif min(different) <= 0:
+        drawn = f'<p class="note">Not every level has a texture: there is no curve against {of}.</p>'
+    else:
+        levels = [Level(each.name, cost, each.score) for each, (_, cost) in zip(chain, costs, strict=True)]
+        drawn = curve_svg([Level(reference, own, 1.0, is_reference=True), *levels], of)
+    return f"<div><h4>FMQM against {of}</h4>{drawn}</div>"
 
 
 def _pair(number: int, record: Record) -> str:
     parts = [
-        f'<div class="title"><div><h3>{_name(record)}</h3><p class="faint">{_text(record["distorted"])}</p></div>'
+        f'<div class="title"><div><h3>{_text(_name(record))}</h3>'
+        f'<p class="faint">{_text(record["distorted"])}</p></div>'
         f'<p class="score"><span class="faint">FMQM</span> {_score(record, "FMQM")}</p></div>'
     ]
     if record["error"]:
@@ -192,7 +234,7 @@ def _pair(number: int, record: Record) -> str:
         )
     if record.get("trust"):
         parts.append(_trust(record["trust"]))
-    return f'<article class="card" id="pair-{number}">{"".join(parts)}</article>'
+    return f'<article class="card" id="pair-{number}">{"".join(parts)}</article>\n'
 
 
 def _views(record: Record, pictures: Record) -> str:
@@ -207,7 +249,7 @@ def _views(record: Record, pictures: Record) -> str:
         for triangles, size in zip(pictures["triangles"], pictures["texture_bytes"], strict=True)
     ]
     size = tuple(pictures["size"])
-    name = _plain_name(record)
+    name = _name(record)
     figures = (
         (_image(pictures["reference"], f"Reference of {name}", size), "Reference", costs[0]),
         (_image(pictures["distorted"], f"Distorted: {name}", size), "Distorted", costs[1]),
@@ -229,7 +271,7 @@ def _legend(has_gaps: bool) -> str:
 
 def _close_ups(worst: Sequence[Record]) -> str:
     if not worst:
-        return "<div><h4>Worst patches</h4><p class=\"note\">None: every patch is like the reference's.</p></div>"
+        return '<div><h4>Worst patches</h4><p class="note">None: every patch is like the reference\'s.</p></div>'
     figures = "".join(
         f'<figure><div class="picture two">{_image(each["reference"], f"Worst patch {rank}, reference")}'
         f"{_image(each['distorted'], f'Worst patch {rank}, distorted')}</div>"
@@ -260,7 +302,8 @@ def _trust(trust: Record) -> str:
         for fact, first, second, unit in rows
     )
     alone = "".join(
-        f'<tr><th scope="row">{_words(fact)}</th><td colspan="2">{_fact(item)}</td><td class="faint">{_unit(item)}</td></tr>'
+        f'<tr><th scope="row">{_words(fact)}</th><td colspan="2">{_fact(item)}</td>'
+        f'<td class="faint">{_unit(item)}</td></tr>'
         for fact, item in pair.items()
     )
     return (
@@ -291,7 +334,7 @@ def _value(value: Any) -> str:
     if isinstance(value, Mapping):
         return "<br>".join(f"{_text(name)}: {_value(part)}" for name, part in value.items()) or "none"
     if isinstance(value, Sequence) and not isinstance(value, str):
-        return "<br>".join(_value(part) for part in value) or "none"
+        return ", ".join(_value(part) for part in value) or "none"
     return _text("none" if value is None else value)
 
 
@@ -304,20 +347,13 @@ def _settings(settings: Mapping[str, Any], versions: Mapping[str, str]) -> str:
     )
 
 
-def _plain_name(record: Record) -> str:
-    return str(record.get("id") or _plain_base_name(record["distorted"]))
-
-
-def _plain_base_name(path: str) -> str:
-    return Path(path).name or path
-
-
 def _name(record: Record) -> str:
-    return _text(_plain_name(record))
+    """Short: the pair's id, or where that is the path of what was scored, the last part of it."""
+    return _base_name(record["distorted"]) if record["id"] == record["distorted"] else str(record["id"])
 
 
 def _base_name(path: str) -> str:
-    return _text(_plain_base_name(path))
+    return Path(path).name or path
 
 
 def _text(text: object) -> str:
@@ -333,5 +369,5 @@ def _count(number: int, of: str) -> str:
     return f"{number:,} {of}" if number == 1 else f"{number:,} {of}s"
 
 
-def _css(color: np.ndarray) -> str:
+def _css(color: Floats) -> str:
     return "#" + "".join(f"{channel:02x}" for channel in np.rint(color * 255).astype(int).tolist())

@@ -206,7 +206,7 @@ def _ray_colors(
     hit = np.flatnonzero(triangle >= 0)
     directions, triangle = directions[hit], triangle[hit]
     a, b, c = (surface.vertices[surface.triangles[triangle, k]] for k in range(3))
-    normals = triangle_normals(surface.vertices, surface.triangles)[triangle]
+    normals = triangle_normals(surface.vertices, surface.triangles[triangle])
     slope = dot(normals, directions)
     normals *= -np.sign(slope)[:, None]  # towards the camera
     light = np.array(LIGHT) * (1, 1, -1) @ camera.axes
