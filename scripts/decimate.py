@@ -18,10 +18,13 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
+from fmqm_addon.batch.log import Log
 from fmqm_addon.blender.process import require_bpy, take_stdout
 from fmqm_addon.metric.errors import FMQMError, SettingsError
 from fmqm_addon.metric.settings import PRESETS, Settings
-from scripts.score import FAILED, INTERRUPTED, OK, OneLineParser, ProgressLine
+from scripts.score import FAILED, INTERRUPTED, OK, OneLineParser
+
+PROGRAM = "decimate.py"
 
 if TYPE_CHECKING:
     from fmqm_addon.blender.decimate import Found, Outcome, Reduced, Step
@@ -29,7 +32,7 @@ if TYPE_CHECKING:
 
 def build_parser() -> OneLineParser:
     parser = OneLineParser(
-        prog="decimate.py",
+        prog=PROGRAM,
         description="The fewest triangles (Decimate, collapse) or the smallest textures whose FMQM is at or above a "
         "target, found by bisection.",
         epilog="Exit codes: 0 found and written; 1 the target is missed even by the dearest version allowed, or a file "
@@ -71,10 +74,11 @@ def main(argv: Sequence[str], out: TextIO) -> int:
         targets = _targets(args)
     except SettingsError as error:
         parser.error(str(error))
+    log = Log(PROGRAM, 1, 1, args.quiet)
     try:
-        return _search(args, targets, settings, out)
+        return _search(args, targets, settings, log, out)
     except FMQMError as error:
-        print(f"decimate.py: {error}", file=sys.stderr)
+        log.say(str(error))
         return FAILED
 
 
@@ -99,7 +103,7 @@ def _targets(args: argparse.Namespace) -> list[float]:
     return targets
 
 
-def _search(args: argparse.Namespace, targets: list[float], settings: Settings, out: TextIO) -> int:
+def _search(args: argparse.Namespace, targets: list[float], settings: Settings, log: Log, out: TextIO) -> int:
     """Searches, prints, writes; Blender is imported only once the arguments are known to be good."""
     require_bpy()
     from fmqm_addon.blender.decimate import Wish, reducing
@@ -114,11 +118,10 @@ def _search(args: argparse.Namespace, targets: list[float], settings: Settings, 
             check_writable(path)
     sizes = () if args.target_texture is None else tuple(texture_sizes(args.reference))
     wish = Wish(tuple(targets), args.max_triangles, args.target_texture, sizes)
-    progress = ProgressLine(1, args.quiet)
     stepper = reducing(file_reader(args.reference), wish, settings)
     while stepper.step():
-        progress.show(stepper.progress.done, stepper.progress.stage)
-    progress.end()
+        log.show(stepper.progress.done, stepper.progress.stage)
+    log.end()
 
     reduced = stepper.result
     document = _json_text(args.reference, settings, reduced)
@@ -130,10 +133,10 @@ def _search(args: argparse.Namespace, targets: list[float], settings: Settings, 
             write_text(args.json, document)
     out.flush()
     for warning in reduced.warnings:
-        print(f"decimate.py: warning: {warning}", file=sys.stderr)
+        log.say(f"warning: {warning}")
     for number, outcome in enumerate(reduced.outcomes):
         if not outcome.last.reached:
-            print(f"decimate.py: {args.reference}: {_missed(outcome, args.max_triangles)}", file=sys.stderr)
+            log.say(f"{args.reference}: {_missed(outcome, args.max_triangles)}")
         elif outputs:
             save_version(args.reference, outcome.last.best.version, outputs[number])
     return OK if all(outcome.last.reached for outcome in reduced.outcomes) else FAILED

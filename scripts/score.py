@@ -37,7 +37,9 @@ from fmqm_addon.metric.errors import FMQMError, SettingsError
 from fmqm_addon.metric.settings import CENTERS, COLOR_SPACES, POOLINGS, PRESETS, SETTING_NAMES, Settings
 from fmqm_addon.report.files import check_writable, write_parts
 from fmqm_addon.report.junit import below, junit_parts
+from fmqm_addon.report.page import write_page
 from fmqm_addon.report.pair import csv_parts, json_parts, table_parts
+from fmqm_addon.report.pair_pictures import has_pictures, open_report_folder
 
 if TYPE_CHECKING:
     from fmqm_addon.batch.run import Scored
@@ -138,8 +140,13 @@ def build_parser() -> OneLineParser:
     )
     output.add_argument("--csv", metavar="FILE", help="one row a pair")
     output.add_argument("--junit", metavar="FILE", help="one test case a pair, for build servers")
+    output.add_argument("--report", metavar="DIR", help="a web page with pictures: DIR/index.html")
     output.add_argument("--save-fields", metavar="FILE.npz", help="samples, fields and patch scores of the one pair")
     output.add_argument("--picture", metavar="FILE.png", help="reference, distorted and heat map of the one pair")
+    output.add_argument(
+        "--attribution", action="store_true", help="in JSON: geometry's and the texture's part of the loss"
+    )
+    output.add_argument("--explain", action="store_true", help="a paragraph a pair: what got worse, where, how surely")
     output.add_argument("--fail-under", type=float, metavar="X", help="exit code 1 if an FMQM is below X")
     output.add_argument("--quiet", action="store_true", help="no progress on stderr")
     return parser
@@ -154,13 +161,18 @@ def main(argv: Sequence[str], out: TextIO) -> int:
         chosen = PRESETS[args.preset] | {
             name: getattr(args, name) for name in SETTING_NAMES if getattr(args, name) is not None
         }
-        options = Options(Settings(**chosen), args.repeats, args.space, args.match_scale)
+        options = Options(
+            Settings(**chosen),
+            args.repeats,
+            args.space,
+            args.match_scale,
+            args.attribution,
+            args.explain,
+            args.report or "",
+        )
         _check_arguments(args)
         options.settings.with_seed(options.settings.seed + args.repeats - 1)
         limits = Limits(args.timeout or Limits.timeout, args.memory_limit and args.memory_limit * 1e9)
-    except SettingsError as error:
-        parser.error(str(error))
-    try:
         if args.worker:
             require_bpy()
             work_off(args.worker, options, limits.timeout)
@@ -168,10 +180,14 @@ def main(argv: Sequence[str], out: TextIO) -> int:
         for path in (args.json, args.csv, args.junit, args.save_fields, args.picture, args.journal):
             if path and path != "-":
                 check_writable(path)
+        if args.report:
+            open_report_folder(args.report)
         rows = _rows(args, options)
         if args.merge:
             return _merge(args, rows, out)
         return _score(args, rows or [], options, limits, argv, out)
+    except SettingsError as error:
+        parser.error(str(error))
     except FMQMError as error:
         print(f"{PROGRAM}: {error}", file=sys.stderr)
         return FAILED
@@ -192,6 +208,8 @@ def _check_arguments(args: argparse.Namespace) -> None:
     for flag in ("timeout", "memory_limit"):
         if getattr(args, flag) is not None and not (args.jobs or args.dask):
             raise SettingsError(f"{_flag(flag)} is for workers; give --jobs too")
+    if args.dask and args.report and not os.path.isabs(args.report):
+        raise SettingsError(f"--report {args.report}: with --dask name a folder that all hosts share, from its root on")
     if args.jobs and args.dask:
         raise SettingsError("--jobs and --dask exclude each other; a cluster has workers of its own")
     if args.resume and not _journal_path(args):
@@ -278,7 +296,11 @@ def _score(
     with _folder_of_workers(path) as folder:
         if args.resume:
             adopt(folder, journal)
-        waiting = {key: Task(key, row) for key, row in zip(keys, rows, strict=True) if key not in journal}
+        waiting = {
+            key: Task(key, row)
+            for key, row in zip(keys, rows, strict=True)
+            if key not in journal or not has_pictures(args.report, journal.record(key))
+        }
         tasks = list(waiting.values())
         try:
             scored = _score_tasks(args, tasks, options, limits, argv, journal, folder)
@@ -289,6 +311,9 @@ def _score(
     records = Records(rows, keys, journal, args.fail_under)
     _say_warnings(records)
     _write(args, records, options.as_dict(), versions, out)
+    code = _exit_code(records)
+    batch = args.manifest or args.glob or args.lods or args.jobs or args.dask or args.journal or args.resume
+    journal.close() if batch else journal.remove()
     if scored is not None:
         from fmqm_addon.report.fields import save_fields
         from fmqm_addon.report.picture import write_picture
@@ -297,9 +322,6 @@ def _score(
             save_fields(args.save_fields, scored.result)
         if args.picture:
             write_picture(args.picture, scored.reference, scored.distorted, scored.result)
-    code = _exit_code(records)
-    batch = args.manifest or args.glob or args.lods or args.jobs or args.dask or args.journal or args.resume
-    journal.close() if batch else journal.remove()
     return code
 
 
@@ -348,12 +370,16 @@ def _write(
         out.writelines(json_parts(records, settings, versions))
     else:
         out.writelines(table_parts(records))
+        if args.explain:
+            out.writelines(f"\n{record['explanation']}\n" for record in records)
         if args.json:
             write_parts(args.json, json_parts(records, settings, versions))
     if args.csv:
         write_parts(args.csv, csv_parts(records))
     if args.junit:
         write_parts(args.junit, junit_parts(records))
+    if args.report:
+        write_page(args.report, records, settings, versions)
     out.flush()
 
 

@@ -17,12 +17,17 @@ class Options:
 
     Attributes:
         settings: of the metric, before a row's own. repeats: seeds. space, match_scale: as blender.space.place.
+        attribution: whose loss it is, too. explain: in words, too.
+        report: folder of the report, for pictures; "" makes none. It changes no score.
     """
 
     settings: Settings
     repeats: int = 1
     space: str = "auto"
     match_scale: bool = False
+    attribution: bool = False
+    explain: bool = False
+    report: str = ""
 
     def settings_of(self, row: Row) -> Settings:
         return replace(self.settings, **dict(row.settings))
@@ -30,7 +35,8 @@ class Options:
     def as_dict(self) -> dict[str, Any]:
         """Plain values under the names of the command line's flags."""
         rest = {"repeats": self.repeats, "space": self.space, "match_scale": self.match_scale}
-        return self.settings.as_dict() | rest
+        asked = {name: True for name in ("attribution", "explain") if getattr(self, name)}
+        return self.settings.as_dict() | rest | asked
 
 
 @dataclass(frozen=True)

@@ -8,20 +8,22 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..metric.errors import FMQMError
+from ..report.explain import explain, where
 from ..report.pair import PairScore, pair_record
+from ..report.pair_pictures import picture_stem, write_pair_pictures
 from .journal import Journal
 from .log import Log
 from .rows import Options, Row, Task, grouped, task_of
 from .workers import end_when_stuck, end_with_parent, journal_of
 
 if TYPE_CHECKING:
-    from ..blender.measure import Measurement
+    from ..blender.measure import Comparison, Measurement
     from ..blender.space import Placed
     from ..metric.score import Result, Stepper
-    from ..metric.surface import Surface
+    from ..metric.surface import MeshArrays, Surface
 
 T = TypeVar("T")
 
@@ -106,6 +108,8 @@ class _Scorer:
                 self._log.say(str(error))
             now = time.perf_counter()
             record = pair_record(replace(pair, seconds={**self._seconds, "total": now - began}))
+            if self._options.explain:
+                record["explanation"] = explain(record)
             self._journal.done(task.key, record)
             began = now
             self._units += 1
@@ -134,14 +138,33 @@ class _Scorer:
             samples=len(result.samples.positions),
             space=placement.label,
             warnings=(*placement.notes, *placement.warnings, *result.warnings),
+            findings=self._findings(row, reference.world(), placement.mesh, compared, measurement),
         )
 
+    def _findings(
+        self, row: Row, reference: MeshArrays, distorted: MeshArrays, compared: Comparison, measurement: Measurement
+    ) -> dict[str, Any]:
+        """What else the options ask for."""
+        from ..blender.attribution import attribute
+
+        findings: dict[str, Any] = {}
+        if self._options.report:
+            stem = picture_stem(row.reference, row.id, row.distorted)
+            surfaces = (measurement.reference, compared.distorted)
+            findings["pictures"] = write_pair_pictures(self._options.report, stem, *surfaces, compared.result)
+        if self._options.explain:
+            findings["where"] = where(measurement.reference, compared.result)
+        if self._options.attribution:
+            stepper = attribute(measurement, reference, distorted, compared)
+            findings["attribution"] = self._work(stepper, f"attributing the loss of {row.id}").as_dict()
+        return findings
+
     def _load(self, row: Row, name: str, image: str) -> Placed:
+        self._log.show(self._units, f"loading {name}")
+        began = time.perf_counter()
         from ..blender.files import load_placed
         from ..blender.material import load_texture
 
-        self._log.show(self._units, f"loading {name}")
-        began = time.perf_counter()
         try:
             return load_placed(row.path(name), load_texture(row.path(image)) if image else None)
         finally:

@@ -10,20 +10,20 @@ repacked, baked) a point has the color of the other surface's nearest point. The
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
 
 from ..metric.color import Material
-from ..metric.errors import MeshError
 from ..metric.fields import closest_on
 from ..metric.score import COLUMNS, Progress, Stepper, Work
-from ..metric.spatial import Floats
+from ..metric.spatial import Floats, Ints
 from ..metric.surface import MeshArrays, Surface
 from .measure import Comparison, Measurement
 
 How = Literal["materials", "nearest points"]
+Mostly = Literal["nothing", "geometry", "texture", "both"]
 
 AGREES = 0.02  # of the texture's side: what noise and decimation shift texture coordinates by at most
 MOST = 0.8  # of the samples; seams and far-moved parts are the rest
@@ -47,16 +47,28 @@ class Attribution:
     how: How
 
     @property
-    def phrase(self) -> str:
-        """For people: "most of the loss is the texture"."""
+    def mostly(self) -> Mostly:
+        """Whose most of the loss is."""
         geometry, texture = self.geometry_loss, self.texture_loss
         if max(geometry, texture) < LITTLE:
-            return "there is hardly any loss"
+            return "nothing"
         if geometry >= CLEARLY * texture:
-            return "most of the loss is the geometry"
-        if texture >= CLEARLY * geometry:
-            return "most of the loss is the texture"
-        return "geometry and texture share the loss"
+            return "geometry"
+        return "texture" if texture >= CLEARLY * geometry else "both"
+
+    @property
+    def phrase(self) -> str:
+        """For people."""
+        return {
+            "nothing": "there is hardly any loss",
+            "geometry": "most of the loss is the geometry",
+            "texture": "most of the loss is the texture",
+            "both": "geometry and texture share the loss",
+        }[self.mostly]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values for JSON: the attributes, "mostly" and the phrase."""
+        return {**asdict(self), "mostly": self.mostly, "phrase": self.phrase}
 
 
 def attribute(
@@ -86,7 +98,7 @@ def _attribute(
             _painted_from(distorted, measurement.reference),
             _painted_from(reference, compared.distorted),
         )
-    losses = []
+    losses: list[float] = []
     for mesh in painted:
         comparing = measurement.compare(mesh)
         while comparing.step():
@@ -116,7 +128,7 @@ def _lie_alike(reference: Surface, compared: Comparison) -> bool:
     return float(np.mean(apart <= AGREES)) >= MOST
 
 
-def _values_at(surface: Surface, points: Floats, triangle: np.ndarray) -> Floats:
+def _values_at(surface: Surface, points: Floats, triangle: Ints) -> Floats:
     """(N, K) corner values at points on (N,) triangles."""
     _, weights = closest_on(surface, points, triangle)
     return np.einsum("nk,nkc->nc", weights, surface.corners[triangle])

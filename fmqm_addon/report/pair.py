@@ -32,6 +32,7 @@ class PairScore:
         seconds: by STAGES; what several pairs share is counted in the first.
         error: why there are no scores.
         space: where the two were compared, as blender.space.Placement.label has it.
+        findings: what else was asked for, by its key in the record: where, attribution, pictures.
     """
 
     reference: str
@@ -44,6 +45,7 @@ class PairScore:
     warnings: tuple[str, ...] = ()
     error: str | None = None
     space: str | None = None
+    findings: dict[str, Any] = field(default_factory=dict)
 
 
 def json_text(pairs: Sequence[PairScore], settings: dict[str, Any], versions: dict[str, str]) -> str:
@@ -105,6 +107,7 @@ def pair_record(pair: PairScore) -> dict[str, Any]:
         "seconds": {stage: pair.seconds.get(stage, 0.0) for stage in STAGES},
         "warnings": list(pair.warnings),
         "error": pair.error,
+        **pair.findings,
     }
 
 
