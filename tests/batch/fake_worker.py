@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A worker that scores nothing but behaves as the names of its pairs say: die, die once, hang, swell, refuse."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from fmqm_addon.batch.journal import Journal
+from fmqm_addon.batch.rows import task_of
+from fmqm_addon.batch.workers import end_with_parent, journal_of
+
+shard = Path(sys.argv[-1])
+end_with_parent()
+if sys.argv[1] == "refuse":
+    sys.exit("no Blender here")
+Path(sys.argv[1]).joinpath(f"{os.getpid()}.pid").touch()
+journal = Journal(journal_of(str(shard)))
+for task in (task_of(plain) for plain in json.loads(shard.read_text(encoding="utf-8"))):
+    journal.start(task.key)
+    name = task.row.distorted
+    once = Path(sys.argv[1]) / f"{task.key}.once"
+    if name == "die" or (name == "die once" and not once.exists()):
+        once.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    if name == "hang":
+        time.sleep(60)
+    if name == "swell":
+        swollen = bytearray(300_000_000)
+        swollen[::4096] = b"x" * len(swollen[::4096])
+        time.sleep(60)
+    journal.done(task.key, {"id": task.row.id, "FMQM": 0.5, "error": None, "pid": os.getpid()})

@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The watch over workers, whatever becomes of them. The workers are fakes: no Blender, no scores."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from fmqm_addon.batch import workers
+from fmqm_addon.batch.journal import Journal, parse_line
+from fmqm_addon.batch.log import Log
+from fmqm_addon.batch.rows import Row, Task
+from fmqm_addon.batch.workers import Limits, adopt, journal_of, score_with_workers
+from fmqm_addon.metric.errors import FMQMError
+
+FAKE = Path(__file__).parent / "fake_worker.py"
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def tasks_of(*names: str) -> list[Task]:
+    return [Task(f"k{number}", Row(str(number), "reference", name)) for number, name in enumerate(names)]
+
+
+def watch(folder: Path, tasks: list[Task], jobs: int = 2, limits: Limits | None = None, told: str = "") -> Journal:
+    journal = Journal(str(folder / "journal"))
+    log = Log("", len(tasks), len(tasks), silent=True)
+    command = [sys.executable, str(FAKE), told or str(folder)]
+    score_with_workers(tasks, command, folder, jobs, limits or Limits(), journal, log)
+    return journal
+
+
+def alive(folder: Path) -> list[int]:
+    """Of the workers that were ever started, those that still run."""
+    return [int(path.stem) for path in folder.glob("*.pid") if Path(f"/proc/{path.stem}").exists()]
+
+
+def finished(folder: Path) -> Counter[str]:
+    """How often each pair was noted as done."""
+    events = map(parse_line, (folder / "journal").read_bytes().splitlines())
+    return Counter(event["done"] for event in events if "done" in event)
+
+
+def test_each_pair_is_scored_once_by_as_many_workers_as_there_are_jobs(tmp_path: Path) -> None:
+    tasks = tasks_of(*["fine"] * 20)
+    journal = watch(tmp_path, tasks, jobs=3)
+    assert finished(tmp_path) == Counter({task.key: 1 for task in tasks})
+    assert len({journal.record(task.key)["pid"] for task in tasks}) >= 3
+    assert not alive(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "limits", "words"),
+    [
+        ("die", Limits(), "its worker died (SIGKILL), 2 times"),
+        ("hang", Limits(timeout=1.5), "not scored within 1.5 s (--timeout), 2 times"),
+        ("swell", Limits(memory=2e8), "scoring it takes more than 0.2 GB of memory (--memory-limit), 2 times"),
+    ],
+)
+def test_a_pair_that_ends_its_worker_costs_only_itself(tmp_path: Path, name: str, limits: Limits, words: str) -> None:
+    tasks = tasks_of("fine", name, "fine", "fine", "fine")
+    journal = watch(tmp_path, tasks, limits=limits)
+    assert finished(tmp_path) == Counter({task.key: 1 for task in tasks})
+    error = journal.record("k1")["error"]
+    assert error.startswith(f"{name}: ") and words in error
+    assert [task.key for task in tasks if journal.record(task.key)["error"]] == ["k1"]
+    assert "k1" not in journal, "a resumed run may try it again"
+    assert not alive(tmp_path)
+
+
+def test_a_pair_that_fails_once_is_tried_once_more(tmp_path: Path) -> None:
+    journal = watch(tmp_path, tasks_of("fine", "die once", "fine"))
+    assert all(journal.record(f"k{number}")["error"] is None for number in range(3))
+
+
+def test_workers_that_never_begin_are_the_runs_error(tmp_path: Path) -> None:
+    with pytest.raises(FMQMError, match="workers end before their first pair .no Blender here."):
+        watch(tmp_path, tasks_of("fine", "fine"), told="refuse")
+
+
+def test_without_a_way_to_watch_memory_it_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(workers, "resident_bytes", lambda pid: None)
+    with pytest.raises(FMQMError, match="--memory-limit"):
+        watch(tmp_path, tasks_of("fine"), limits=Limits(memory=1e9))
+
+
+def test_memory_is_told_by_proc_and_by_ps(monkeypatch: pytest.MonkeyPatch) -> None:
+    by_proc = workers.resident_bytes(os.getpid())
+    monkeypatch.setattr(workers.Path, "read_text", lambda *_, **__: "")
+    by_ps = workers.resident_bytes(os.getpid())
+    if by_proc is None or by_ps is None:
+        pytest.skip("this system has only one of the two")
+    assert by_ps == pytest.approx(by_proc, rel=0.2) and by_ps > 1e7
+
+
+PARENT = """
+import sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[1])
+from tests.batch.test_workers import tasks_of, watch
+try:
+    watch(Path(sys.argv[2]), tasks_of("fine", "hang", "fine", "hang"))
+except KeyboardInterrupt:
+    sys.exit(130)
+"""
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
+def test_workers_end_with_their_parent_and_what_they_did_is_kept(tmp_path: Path, how: signal.Signals) -> None:
+    parent = subprocess.Popen([sys.executable, "-c", PARENT, str(ROOT), str(tmp_path)])
+    wait_for(lambda: len(alive(tmp_path)) == 2 and all(done_by(path) for path in tmp_path.glob("shard-*.json")))
+    parent.send_signal(how)
+    assert parent.wait(10) == (130 if how == signal.SIGINT else -how)
+    wait_for(lambda: not alive(tmp_path))
+    journal = Journal(str(tmp_path / "journal"), resume=True)
+    adopt(tmp_path, journal)
+    assert "k0" in journal and "k1" not in journal
+
+
+def done_by(shard: Path) -> bool:
+    """Whether its worker has come to the pair that hangs."""
+    written = Path(journal_of(str(shard)))
+    return written.exists() and b"done" in written.read_bytes()
+
+
+def wait_for(condition: object) -> None:
+    end = time.monotonic() + 10
+    while not condition():  # type: ignore[operator]
+        assert time.monotonic() < end, "it does not come"
+        time.sleep(0.05)
