@@ -20,6 +20,7 @@ from ..metric.spatial import Floats
 from .colormap import NO_PATCH, score_colors
 from .curve import Level, curve_svg
 from .files import write_parts
+from .junit import below
 from .pair import SHOWN
 
 PAGE = "index.html"
@@ -47,7 +48,8 @@ def write_page(
 
     Args:
         records: the pairs as JSON has them, in their order; gone through more than once. Besides the scores each
-            may hold "trust", and "pictures", which is what write_pair_pictures returned.
+            may hold "trust", "explanation", "attribution", and "pictures", which is what
+            write_pair_pictures returned.
         settings, versions: as JSON has them.
 
     Raises:
@@ -150,11 +152,13 @@ def _summary(overview: _Overview) -> str:
 
 
 def _row(number: int, record: Record) -> str:
-    below = f'<span class="faint">of {_text(_base_name(record["reference"]))}</span>'
+    note = f'<span class="faint">of {_text(_base_name(record["reference"]))}</span>'
     if record["error"]:
-        below = '<span class="bad">not scored</span>'
+        note = '<span class="bad">not scored</span>'
+    elif below(record):
+        note = f'<span class="bad">below {record["fail_under"]:g}</span>'
     name = escape(_name(record))
-    cells = [f'<th scope="row" data-value="{name}"><a href="#pair-{number}">{_text(_name(record))}</a><br>{below}</th>']
+    cells = [f'<th scope="row" data-value="{name}"><a href="#pair-{number}">{_text(_name(record))}</a><br>{note}</th>']
     cells += [_cell(record[column], _score(record, column) + _bar(record[column])) for column in SHOWN]
     pictures = record.get("pictures")
     triangles, size = (pictures["triangles"][1], pictures["texture_bytes"][1]) if pictures else (None, None)
@@ -212,10 +216,13 @@ def _pair(number: int, record: Record) -> str:
     parts = [
         f'<div class="title"><div><h3>{_text(_name(record))}</h3>'
         f'<p class="faint">{_text(record["distorted"])}</p></div>'
-        f'<p class="score"><span class="faint">FMQM</span> {_score(record, "FMQM")}</p></div>'
+        f'<p class="score"><span class="faint">FMQM</span> {_score(record, "FMQM")}</p></div>',
+        f'<p class="bad">Below its threshold, {record["fail_under"]:g}.</p>' if below(record) else "",
     ]
     if record["error"]:
         parts.append(f'<p class="bad">Not scored: {_text(record["error"])}</p>')
+    if record.get("explanation") and not record["error"]:
+        parts.append(f'<p class="words">{_text(record["explanation"])}</p>')
     if record["warnings"]:
         items = "".join(f"<li>{_text(warning)}</li>" for warning in record["warnings"])
         parts.append(f'<ul class="warnings" aria-label="Warnings">{items}</ul>')
@@ -230,11 +237,22 @@ def _pair(number: int, record: Record) -> str:
         )
         close_ups = _close_ups(pictures["worst"]) if pictures else ""
         parts.append(
-            f'<div class="panels"><div><h4>Features</h4><dl class="features">{features}</dl></div>{close_ups}</div>'
+            f'<div class="panels"><div><h4>Features</h4><dl class="features">{features}</dl>'
+            f"{_attribution(record.get('attribution'))}</div>{close_ups}</div>"
         )
     if record.get("trust"):
         parts.append(_trust(record["trust"]))
     return f'<article class="card" id="pair-{number}">{"".join(parts)}</article>\n'
+
+
+def _attribution(attribution: Record | None) -> str:
+    if attribution is None:
+        return ""
+    return (
+        f'<p class="note">{escape(attribution["says"][:1].upper() + attribution["says"][1:])}: '
+        f"{attribution['geometry_loss']:.3f} of FMQM with the geometry alone distorted, "
+        f"{attribution['texture_loss']:.3f} with the texture alone.</p>"
+    )
 
 
 def _views(record: Record, pictures: Record) -> str:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
@@ -53,6 +53,14 @@ def open_report_folder(folder: str) -> None:
         raise FileError(f"{folder}: this folder cannot be made ({error.strerror or error}); name another") from error
     check_writable(os.path.join(folder, PICTURES, "any"))
     check_writable(os.path.join(folder, "any"))
+
+
+def has_pictures(folder: str | None, record: Mapping[str, Any]) -> bool:
+    """Whether a pair needs no more pictures: there is no report, it has no scores, or they are in the folder."""
+    if not folder or record["error"] is not None:
+        return True
+    pictures = record.get("pictures")
+    return pictures is not None and os.path.exists(os.path.join(folder, pictures["heat"]))
 
 
 def picture_stem(*parts: str) -> str:

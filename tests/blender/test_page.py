@@ -39,7 +39,11 @@ def record(distorted: str = "lod.glb", score: float | None = 0.5, **others: Any)
     """A pair as JSON has it."""
     scores = dict.fromkeys(COLUMNS, score)
     pair = {"id": distorted, "reference": "ref.glb", "distorted": distorted, **scores, "stderr": None}
-    return pair | {"warnings": [], "error": None if score is not None else "it cannot be read"} | others
+    return (
+        pair
+        | {"fail_under": None, "warnings": [], "error": None if score is not None else "it cannot be read"}
+        | others
+    )
 
 
 def costs(triangles: int, texture_bytes: int) -> dict[str, Any]:
@@ -242,3 +246,18 @@ def test_the_page_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
         write_page(str(tmp_path), [{}], SETTINGS, VERSIONS)
     assert [path.name for path in tmp_path.iterdir()] == ["index.html"]
     assert (tmp_path / "index.html").read_bytes() == before
+
+
+def test_words_losses_and_thresholds_are_shown_where_there_are_any() -> None:
+    losses = {"geometry_loss": 0.01, "texture_loss": 0.4321, "says": "most of the loss is the texture"}
+    told = Page(record(explanation="It looks bad.", attribution=losses, fail_under=0.75))
+    for text in (
+        "It looks bad.",
+        "Most of the loss is the texture: 0.010",
+        "0.432 with",
+        "below 0.75",
+        "threshold, 0.75",
+    ):
+        assert text in told.text
+    plain = Page(record(fail_under=0.5))
+    assert "loss" not in plain.text and "below" not in plain.text and "threshold, " not in plain.text

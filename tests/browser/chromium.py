@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import base64
+import fcntl
 import json
 import os
 import select
@@ -29,12 +30,12 @@ class Page:
 
     def __init__(self, program: str) -> None:
         self._profile = tempfile.TemporaryDirectory(prefix="fmqm-chromium-")
-        ours_in, theirs_out = os.pipe()
-        theirs_in, ours_out = os.pipe()
+        ours_in, theirs_out = _pipe()
+        theirs_in, ours_out = _pipe()
         # Chromium reads commands from 3 and answers on 4.
         redirect = f'exec "$0" "$@" 3<&{theirs_in} 4>&{theirs_out}'
         self._process = subprocess.Popen(
-            ["sh", "-c", redirect, program, *FLAGS, f"--user-data-dir={self._profile.name}", "about:blank"],
+            ["bash", "-c", redirect, program, *FLAGS, f"--user-data-dir={self._profile.name}", "about:blank"],
             pass_fds=(theirs_in, theirs_out),
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
@@ -136,3 +137,12 @@ class Page:
         elif method == "Log.entryAdded":
             self.messages.append(parameters["entry"]["text"])
         return message
+
+
+def _pipe() -> tuple[int, int]:
+    """Both ends of a pipe, above the numbers that Chromium wants."""
+    ends = []
+    for end in os.pipe():
+        ends.append(fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, 10))
+        os.close(end)
+    return ends[0], ends[1]
