@@ -1,0 +1,251 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""scripts/score.py on many pairs: manifests, workers, resuming, shards, LOD chains, JUnit."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+
+from tests.blender.script import (
+    COLUMNS,
+    SCORE,
+    noise,
+    numbers,
+    read_json,
+    score,
+    without_seconds,
+    write_png,
+    write_torus,
+)
+
+TINY = ("--samples", "640", "--patches", "20", "--color-units", "5")
+SHAKEN = [f"shaken{number}.obj" for number in range(20)]
+HOSTILE = ["cut.glb", "nowhere.obj", "flat.obj", "a.png", "broken.obj"]
+
+
+@pytest.fixture(scope="module")
+def assets(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """ref.obj, copies of it that are shaken more and more, and five files that cannot be scored."""
+    folder = tmp_path_factory.mktemp("assets")
+    write_png(folder / "a.png", noise(seed=1))
+    write_torus(folder, "ref", "a.png")
+    write_torus(folder, "broken", "missing.png")
+    for number, name in enumerate(SHAKEN):
+        write_torus(folder, Path(name).stem, "a.png", shake=0.002 * number)
+    (folder / "cut.glb").write_bytes(b"glTF\2\0\0\0\xff\xff\0\0")
+    (folder / "flat.obj").write_text("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n")
+    return folder
+
+
+def write_manifest(folder: Path, rows: list[dict[str, Any]], name: str = "pairs.json") -> Path:
+    (folder / name).write_text(json.dumps(rows), encoding="utf-8")
+    return folder / name
+
+
+def pairs_of(*names: str) -> list[dict[str, Any]]:
+    return [{"reference": "ref.obj", "distorted": name} for name in names]
+
+
+def events(journal: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in journal.read_text(encoding="utf-8").splitlines()]
+
+
+def scored(journal: Path) -> list[str]:
+    return [event["pair"]["distorted"] for event in events(journal) if "done" in event]
+
+
+def bytes_but_for_seconds(path: Path) -> str:
+    text = path.read_text(encoding="utf-8")
+    return re.sub(r'("(?:load|prepare|fields|features|total)": |time=")[-+.e0-9]+', r"\1", text)
+
+
+def test_200_pairs_five_hostile_killed_twice_and_resumed(assets: Path, tmp_path: Path) -> None:
+    """As if nothing had happened: 195 scores, five errors, each once, the same bytes as an undisturbed run."""
+    rows = [row | {"seed": seed, "id": f"{seed} {row['distorted']}"} for seed in range(10) for row in pairs_of(*SHAKEN)]
+    for place, name in zip((0, 50, 99, 100, 199), HOSTILE, strict=True):
+        rows[place] |= {"distorted": name}
+    manifest = write_manifest(assets, rows, "many.json")
+
+    def outputs(folder: str) -> list[str]:
+        (tmp_path / folder).mkdir(exist_ok=True)
+        return [f"--{kind}={tmp_path / folder / f'all.{kind}'}" for kind in ("json", "csv", "junit")]
+
+    command = ["--manifest", manifest, *TINY, "--quiet"]
+    assert score(*command, *outputs("calm")).returncode == 1
+    journal = tmp_path / "killed" / "all.json.journal.jsonl"
+    for part in (60, 130):
+        arguments = map(str, [*command, *outputs("killed"), "--jobs", "2", "--resume"])
+        parent = subprocess.Popen([sys.executable, str(SCORE), *arguments], stderr=subprocess.DEVNULL)
+        end = time.monotonic() + 60
+        while not journal.exists() or journal.read_bytes().count(b'{"done"') < part:
+            assert parent.poll() is None and time.monotonic() < end
+            time.sleep(0.02)
+        parent.send_signal(signal.SIGKILL)
+        parent.wait()
+    assert not (tmp_path / "killed" / "all.json").exists()
+    assert score(*command, *outputs("killed"), "--jobs", "2", "--resume").returncode == 1
+
+    done = Counter(event["done"] for event in events(journal) if "done" in event)
+    assert len(done) == 200 and set(done.values()) == {1}
+    pairs = read_json(tmp_path / "killed" / "all.json")["pairs"]
+    assert [pair["id"] for pair in pairs] == [row["id"] for row in rows]
+    assert [pair["distorted"] for pair in pairs if pair["error"]] == HOSTILE
+    assert all(0 < pair["FMQM"] <= 1 for pair in pairs if not pair["error"])
+    for kind in ("json", "csv", "junit"):
+        calm, killed = (bytes_but_for_seconds(tmp_path / folder / f"all.{kind}") for folder in ("calm", "killed"))
+        assert calm == killed
+    left = sorted(path.name for path in (tmp_path / "killed").iterdir())
+    assert left == ["all.csv", "all.json", "all.json.journal.jsonl", "all.junit"]
+
+
+def test_the_same_bytes_whatever_the_number_of_jobs(assets: Path, tmp_path: Path) -> None:
+    manifest = write_manifest(assets, pairs_of(*SHAKEN[:6], "cut.glb"))
+    told = []
+    for jobs in (("--jobs", 1), ("--jobs", 8)):
+        done = score("--manifest", manifest, *TINY, *jobs, "--json", tmp_path / "j", "--csv", tmp_path / "c")
+        assert done.returncode == 1 and len(done.stdout.splitlines()) == 8
+        told.append((done.stdout, bytes_but_for_seconds(tmp_path / "j"), (tmp_path / "c").read_bytes()))
+    assert told[0] == told[1]
+
+
+def test_resuming_scores_what_is_missing_or_has_changed(assets: Path, tmp_path: Path) -> None:
+    rows = pairs_of(*SHAKEN[:4])
+    journal = tmp_path / "journal"
+    command = [*TINY, "--json", tmp_path / "j", "--journal", journal, "--resume", "--quiet"]
+    assert score("--manifest", write_manifest(assets, rows), *command).returncode == 0
+    first = read_json(tmp_path / "j")
+    rows[1] |= {"sigma": 0.02}
+    rows[2] |= {"fail_under": 1, "id": "a new name"}
+    rows.append({"reference": "ref.obj", "distorted": "ref.obj"})
+    done = score("--manifest", write_manifest(assets, rows), *command)
+    assert done.returncode == 1, "the new threshold counts without a new score"
+    assert scored(journal)[4:] == [SHAKEN[1], "ref.obj"]
+    second = read_json(tmp_path / "j")
+    assert [numbers(pair) for pair in second["pairs"]][0::2] == [
+        *(numbers(first["pairs"][k]) for k in (0, 2)), [1.0] * 5,
+    ]  # fmt: skip
+    assert numbers(second["pairs"][1]) != numbers(first["pairs"][1])
+    assert second["pairs"][1]["settings"] == {"sigma": 0.02} and second["pairs"][2]["id"] == "a new name"
+    assert score("--manifest", assets / "pairs.json", *command, "--seed", "3").returncode == 1
+    assert len(scored(journal)) == 6 + 5, "another seed is another score for all"
+    assert score("--manifest", assets / "pairs.json", *command[:-2]).returncode == 1
+    assert len(scored(journal)) == 5, "without --resume it begins anew"
+
+
+def test_interrupted_run_says_how_to_go_on(assets: Path, tmp_path: Path) -> None:
+    """SIGTERM as Ctrl-C; plain pairs too, whose journal is gone once they are all done."""
+    command = [sys.executable, str(SCORE), "ref.obj", *SHAKEN, *TINY, "--csv", str(tmp_path / "c"), "--quiet"]
+    journal = tmp_path / "c.journal.jsonl"
+    for how in (signal.SIGINT, signal.SIGTERM):
+        known = len(scored(journal)) if journal.exists() else 0
+        process = subprocess.Popen(command, cwd=assets, stderr=subprocess.PIPE, text=True)
+        while not journal.exists() or journal.read_bytes().count(b'{"done"') <= known:
+            assert process.poll() is None
+            time.sleep(0.02)
+        process.send_signal(how)
+        _, told = process.communicate(timeout=20)
+        assert process.returncode == 130 and "--resume" in told and "Traceback" not in told
+        before = len(scored(journal))
+        assert 0 < before < len(SHAKEN) and not (tmp_path / "c").exists()
+        command += ["--resume"]
+    done = score(*command[2:], cwd=assets)
+    assert done.returncode == 0 and sorted(scored(journal)) == sorted(SHAKEN)
+    assert score("ref.obj", SHAKEN[0], *TINY, "--csv", tmp_path / "d", cwd=assets).returncode == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["c", "c.journal.jsonl", "d"]
+
+
+def test_junit(assets: Path, tmp_path: Path) -> None:
+    rows = pairs_of("ref.obj", SHAKEN[9], SHAKEN[19], "cut.glb")
+    rows[2] |= {"fail_under": 0.01}
+    done = score("--manifest", write_manifest(assets, rows), *TINY, "--fail-under", 0.999, "--junit", tmp_path / "x")
+    assert done.returncode == 1
+    suite = ElementTree.parse(tmp_path / "x").getroot()[0]
+    assert [suite.get(name) for name in ("tests", "failures", "errors")] == ["4", "1", "1"]
+    cases = {case.get("name"): [child.tag for child in case if child.tag != "system-out"] for case in suite}
+    assert cases == {"ref.obj": [], SHAKEN[9]: ["failure"], SHAKEN[19]: [], "cut.glb": ["error"]}
+    message = suite.find("*/failure").get("message")  # type: ignore[union-attr]
+    assert "below 0.999" in message and all(name in message for name in COLUMNS)
+    assert "cut.glb" in suite.find("*/error").get("message")  # type: ignore[union-attr]
+
+
+def test_shards_merge_into_the_whole(assets: Path, tmp_path: Path) -> None:
+    manifest = write_manifest(assets, pairs_of(*SHAKEN[:5]))
+    command = ["--manifest", manifest, *TINY, "--quiet", "--fail-under", "0.9"]
+    whole = score(*command, "--json", tmp_path / "whole")
+    for shard in ("1/2", "2/2"):
+        assert score(*command, "--shard", shard, "--json", tmp_path / shard[0]).returncode in (0, 1)
+    parts = [tmp_path / "2", tmp_path / "1"]
+    done = score("--merge", *parts, "--manifest", manifest, "--json", tmp_path / "merged")
+    assert (done.returncode, done.stdout) == (whole.returncode, whole.stdout)
+    assert without_seconds(read_json(tmp_path / "merged")) == without_seconds(read_json(tmp_path / "whole"))
+    gap = score("--merge", tmp_path / "1", tmp_path / "1", "--manifest", manifest, "--csv", tmp_path / "c")
+    assert gap.returncode == 1
+    assert [line for line in gap.stderr.splitlines() if "is there twice" in line] and "none of the parts" in gap.stderr
+    rows = list(csv.DictReader((tmp_path / "c").read_text(encoding="utf-8").splitlines()))
+    assert [bool(row["error"]) for row in rows] == [False, True, False, True, False]
+    assert score(*command, "--seed", 5, "--shard", "2/2", "--json", tmp_path / "2").returncode in (0, 1)
+    done = score("--merge", *parts)
+    assert done.returncode == 1 and "settings differ" in done.stderr and done.stdout == ""
+    done = score("--merge", assets / "a.png", "--json", tmp_path / "no")
+    assert done.returncode == 1 and "a.png: not a JSON output" in done.stderr
+
+
+def test_lod_chains_of_a_file(assets: Path, tmp_path: Path) -> None:
+    """Of a glb and of a blend: each level against level 0 and against the level before."""
+    import bpy
+
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    for level in range(3):
+        bpy.ops.wm.obj_import(filepath=str(assets / SHAKEN[6 * level]))
+        bpy.context.selected_objects[0].name = f"Rock_LOD{level}"
+    bpy.ops.mesh.primitive_cube_add()
+    bpy.ops.export_scene.gltf(filepath=str(tmp_path / "rock.glb"))
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "rock.blend"))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    for name in ("rock.glb", "rock.blend"):
+        done = score("--lods", name, *TINY, "--json", "j", "--quiet", cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        pairs = {pair["id"]: pair for pair in read_json(tmp_path / "j")["pairs"]}
+        assert list(pairs) == ["Rock LOD1 / LOD0", "Rock LOD2 / LOD0", "Rock LOD2 / LOD1"]
+        assert pairs["Rock LOD2 / LOD1"]["reference"] == f"{name}:Rock_LOD1"
+        assert 1 > pairs["Rock LOD1 / LOD0"]["FMQM"] > pairs["Rock LOD2 / LOD0"]["FMQM"]
+    done = score("--lods", assets / "ref.obj", *TINY)
+    assert done.returncode == 1 and "ref.obj: no names in it tell levels" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--manifest", "none.csv"), "none.csv: cannot be read"),
+        (("--manifest", "bad.csv"), "bad.csv, row 2: samples is x"),
+        (("--manifest", "bad.csv", "ref.obj"), "--manifest"),
+        (("--manifest", "bad.csv", "--lods", "x.blend"), "leave out --lods"),
+        (("--manifest", "bad.csv", "--texture", "a.png"), "name them in a manifest"),
+        (("--glob", "*.obj"), "REFERENCE"),
+        (("ref.obj", "--glob", "*.fbx"), "no file matches"),
+        (("ref.obj", "a.obj", "--jobs", "0"), "--jobs is 0"),
+        (("ref.obj", "a.obj", "--timeout", "5"), "--timeout is for workers"),
+        (("ref.obj", "a.obj", "--jobs", "1", "--memory-limit", "nan"), "--memory-limit is nan"),
+        (("ref.obj", "a.obj", "--shard", "3/2"), "--shard is 3/2"),
+        (("ref.obj", "a.obj", "--resume"), "--resume needs"),
+        (("ref.obj", "a.obj", "--jobs", "1", "--picture", "p.png"), "--picture"),
+        (("ref.obj", "a.obj", "--jobs", "1", "--dask", "tcp://127.0.0.1:1"), "--dask exclude each other"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
+)
+def test_wrong_arguments_are_one_line(assets: Path, arguments: tuple[str, ...], words: str) -> None:
+    (assets / "bad.csv").write_text("reference,distorted,samples\nref.obj,b,x\n")
+    done = score(*arguments, cwd=assets)
+    assert done.returncode in (1, 2) and done.stdout == ""
+    assert words in done.stderr and len(done.stderr.splitlines()) == 1
