@@ -26,7 +26,7 @@ from fmqm_addon.report.page import page_parts, write_page
 from fmqm_addon.report.pair_pictures import open_report_folder, picture_stem, texture_bytes, write_pair_pictures
 from fmqm_addon.report.picture import Camera, is_seen, render
 
-from .script import COLUMNS
+from .script import COLUMNS, SMALL, noise, score, write_png, write_torus
 from .test_picture import FEW, RED, compared, hue
 
 HOSTILE = "<script>alert(1)</script>&\"'\u202e.glb"
@@ -261,3 +261,58 @@ def test_words_losses_and_thresholds_are_shown_where_there_are_any() -> None:
         assert text in told.text
     plain = Page(record(fail_under=0.5))
     assert "loss" not in plain.text and "below" not in plain.text and "threshold, " not in plain.text
+
+
+# score.py --report
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two levels and a file that cannot be read, scored and reported in one go."""
+    folder = tmp_path_factory.mktemp("assets")
+    write_png(folder / "a.png", noise(seed=1))
+    write_torus(folder, "ref", "a.png")
+    for k in (1, 2):
+        write_torus(folder, f"lod{k}", "a.png", shake=0.01 * k)
+    (folder / "cut.glb").write_bytes(b"glTF\2\0\0\0\xff\xff\0\0")
+    assert score(*FILES, "--report", "whole", cwd=folder).returncode == 1
+    return folder
+
+
+FILES = ("ref.obj", "lod1.obj", "cut.glb", "lod2.obj", *SMALL)
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_a_report_from_workers_resumed_draws_what_is_missing(run: Path) -> None:
+    batch = (*FILES, "--report", "jobs", "--journal", "jobs.jsonl")
+    assert score(*batch, "--jobs", "2", cwd=run).returncode == 1
+    whole = files(run / "whole")
+    assert files(run / "jobs") == whole and len(whole) == 1 + 2 * 9
+    kept, lost = sorted((run / "jobs" / "pictures").glob("*-heat.jpg"))
+    lost.unlink()
+    before = kept.stat().st_mtime_ns
+    assert score(*batch, "--resume", cwd=run).returncode == 1
+    assert files(run / "jobs") == whole and kept.stat().st_mtime_ns == before
+
+
+def test_a_report_is_merged_from_shards(run: Path) -> None:
+    for shard in (1, 2):
+        flags = ("--shard", f"{shard}/2", "--report", "parts", "--json", f"part{shard}.json")
+        score(*FILES, *flags, cwd=run)
+    assert score("--merge", "part1.json", "part2.json", "--report", "parts", cwd=run).returncode == 1
+    merged, whole = files(run / "parts"), files(run / "whole")
+    page = "index.html"
+    assert {name: data for name, data in merged.items() if name != page} == {
+        name: data for name, data in whole.items() if name != page
+    }
+    assert sorted(re.findall(rb"<h3>.*?</h3>", merged[page])) == sorted(re.findall(rb"<h3>.*?</h3>", whole[page]))
+
+
+def test_a_report_that_cannot_be_written_is_said_before_any_work(run: Path) -> None:
+    (run / "taken").write_text("")
+    done = score(*FILES, "--report", "taken", cwd=run)
+    assert done.returncode == 1 and done.stdout == ""
+    assert re.fullmatch(r"score\.py: taken: this folder cannot be made \(.*\); name another\n", done.stderr)
