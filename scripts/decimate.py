@@ -61,7 +61,10 @@ def build_parser() -> OneLineParser:
 
 
 def _numbers(text: str) -> list[float]:
-    return [float(part) for part in text.split(",")]
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text} is no list of numbers such as 0.95,0.9,0.8") from error
 
 
 def main(argv: Sequence[str], out: TextIO) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from . import inputs, look, measuring, panels, properties, results, scene, watch
+from . import decimate, inputs, look, measuring, panels, properties, results, scene, watch
 
 _look_groups = tuple(cls for cls in look.CLASSES if issubclass(cls, bpy.types.PropertyGroup))
 _look_rest = tuple(cls for cls in look.CLASSES if cls not in _look_groups)
@@ -14,12 +14,14 @@ _look_rest = tuple(cls for cls in look.CLASSES if cls not in _look_groups)
 CLASSES: tuple[type, ...] = (
     *properties.CLASSES,
     *_look_groups,
+    decimate.FMQMDecimate,
     *scene.CLASSES,
     *inputs.CLASSES,
     *measuring.CLASSES,
     *results.CLASSES,
     *panels.CLASSES,
     *_look_rest,
+    *decimate.CLASSES,
 )
 
 

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import time
 import uuid
 from typing import ClassVar
 
@@ -20,10 +19,7 @@ from . import session, watch
 from .inputs import reference_of
 from .properties import PRESET_PROPERTIES, FMQMRow, item_target, metric_settings, numbers_text
 from .scene import FMQMScene
-
-SLICE = 0.035  # seconds of work per tick of the timer: the window stays smooth
-SHOWN_EVERY = 0.2  # seconds between redraws of the progress
-TICK = 0.005  # seconds between ticks, for Blender to draw and listen
+from .stepped import SteppedOperator
 
 
 def why_not(fmqm: FMQMScene) -> str:
@@ -41,18 +37,14 @@ def why_not(fmqm: FMQMScene) -> str:
     return ""
 
 
-class FMQM_OT_measure(bpy.types.Operator):  # noqa: N801
-    """In the window it works between redraws and can be cancelled; called from Python it runs at once."""
-
+class FMQM_OT_measure(SteppedOperator, bpy.types.Operator):  # noqa: N801
     bl_idname = "fmqm.measure"
     bl_label = "Measure Quality"
     bl_description = "Score the listed objects against the reference. Esc cancels"
     bl_options: ClassVar = {"UNDO"}  # no REGISTER: adjusting the last operation would measure all over again
 
-    _stepper: Stepper[list[Outcome]]
-    _job: session.Job
+    stepper: Stepper[list[Outcome]]
     _scene: str
-    _shown: float = 0.0
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -61,82 +53,7 @@ class FMQM_OT_measure(bpy.types.Operator):  # noqa: N801
             cls.poll_message_set(reason)
         return not reason
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        if not self._prepare(context):
-            return {"CANCELLED"}
-        self._stepper.run()
-        return self._finish(context)
-
-    def invoke(self, context: bpy.types.Context, _: bpy.types.Event) -> set[str]:
-        if bpy.app.background or context.window is None:
-            return self.execute(context)
-        if not self._prepare(context):
-            return {"CANCELLED"}
-        window_manager, stepper, workspace = context.window_manager, self._stepper, context.workspace
-        timer = window_manager.event_timer_add(TICK, window=context.window)
-
-        def stop() -> None:
-            """Once; from wherever the end comes."""
-            if session.job is not job:
-                return
-            session.job = None
-            stepper.cancel()
-            window_manager.event_timer_remove(timer)
-            workspace.status_text_set(None)
-            watch.redraw()
-            watch.soon()
-
-        self._job = job = session.job = session.Job(stop)
-        session.longest_tick = 0.0
-        window_manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
-
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        job = self._job
-        if session.job is not job:  # another file, or the add-on was disabled
-            return {"CANCELLED"}
-        if job.cancelled or (event.type == "ESC" and event.value == "PRESS"):
-            job.stop()
-            self.report({"INFO"}, "Measurement cancelled")
-            return {"CANCELLED"}
-        if event.type != "TIMER":
-            return {"PASS_THROUGH"}
-        try:
-            more = self._slice()
-        except BaseException:
-            job.stop()
-            raise
-        if more:
-            self._show(context, job)
-            return {"PASS_THROUGH"}
-        job.stop()
-        return self._finish(context)
-
-    def cancel(self, _: bpy.types.Context) -> None:
-        """Blender ends the operator: a window was closed, another file was opened."""
-        self._job.stop()
-
-    def _slice(self) -> bool:
-        """Some milliseconds of work; whether there is more."""
-        began = time.perf_counter()
-        more = True
-        while more and time.perf_counter() - began < SLICE:
-            more = self._stepper.step()
-        session.longest_tick = max(session.longest_tick, time.perf_counter() - began)
-        return more
-
-    def _show(self, context: bpy.types.Context, job: session.Job) -> None:
-        """Progress in sidebar and status bar, some times a second."""
-        progress = self._stepper.progress
-        job.progress = progress.done
-        now = time.perf_counter()
-        if progress.stage == job.text and now - self._shown < SHOWN_EVERY:
-            return
-        self._shown, job.text = now, progress.stage
-        context.workspace.status_text_set(f"FMQM: {job.text}, {100 * job.progress:.0f} %        Esc: Cancel")
-        watch.redraw()
-
-    def _prepare(self, context: bpy.types.Context) -> bool:
+    def begin(self, context: bpy.types.Context) -> bool:
         fmqm = context.scene.fmqm
         try:
             settings = metric_settings(fmqm.settings)
@@ -151,18 +68,18 @@ class FMQM_OT_measure(bpy.types.Operator):  # noqa: N801
         compared = [target_of(target) for item in fmqm.compared if (target := item_target(item)) is not None]
         self._scene = context.scene.name_full
         self._settings_text = json.dumps({**settings.as_dict(), **asked})
-        self._stepper = measuring(
+        self.stepper = measuring(
             target_of(reference_of(fmqm), fmqm.bare_reference), list(dict.fromkeys(compared)), settings, **asked
         )
         return True
 
-    def _finish(self, context: bpy.types.Context) -> set[str]:
+    def finish(self, context: bpy.types.Context) -> set[str]:
         """All rows at once: one undo step."""
         scene = next((scene for scene in bpy.data.scenes if scene.name_full == self._scene), None)
         if scene is None:
             self.report({"WARNING"}, "The scene is gone, and the scores with it")
             return {"CANCELLED"}
-        outcomes = self._stepper.result
+        outcomes = self.stepper.result
         for outcome in outcomes:
             _write_row(scene.fmqm, outcome, self._settings_text)
         _choose_row(scene.fmqm, outcomes[0])

@@ -6,6 +6,7 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, IntProperty, PointerProperty
 
+from .decimate import FMQMDecimate
 from .look import FMQMLook, row_chosen
 from .properties import FMQMItem, FMQMRow, FMQMSettings, is_asset
 
@@ -54,6 +55,9 @@ class FMQMScene(bpy.types.PropertyGroup):
         name="Active Result", description="Chosen row of the results", default=0, min=0, update=_row_chosen
     )
     look: PointerProperty(name="Look", description="What of the chosen result is shown", type=FMQMLook)
+    decimate: PointerProperty(
+        name="Decimate", description="Search for the fewest triangles that are good enough", type=FMQMDecimate
+    )
 
 
 CLASSES = (FMQMScene,)

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Decimate to Quality: a copy of the active object with as few triangles as a target allows."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import bpy
+from bpy.props import BoolProperty, FloatProperty, IntProperty, StringProperty
+
+from ..blender.decimate import LEAST_TRIANGLES, Found, Reader, Reduced, Wish, decimated_copy, reducing, scene_reader
+from ..metric.errors import FMQMError
+from ..metric.score import Stepper, Work
+from ..metric.settings import Settings
+from . import session
+from .properties import metric_settings
+from .stepped import SteppedOperator
+
+
+class FMQMDecimate(bpy.types.PropertyGroup):
+    """What is searched for, and how the last search went."""
+
+    target: FloatProperty(
+        name="Target FMQM",
+        description="The copy scores at least this much against the original",
+        default=0.9,
+        min=0.01,
+        max=1.0,
+        precision=2,
+        step=1,
+    )
+    limited: BoolProperty(
+        name="Limit Triangles", description="Never more triangles than this, even if the target is missed then"
+    )
+    max_triangles: IntProperty(
+        name="Max Triangles", description="The most triangles of the copy", default=10_000, min=LEAST_TRIANGLES
+    )
+    path: StringProperty(name="Path", description="Versions that were scored, one a line")
+
+
+class FMQM_OT_decimate(SteppedOperator, bpy.types.Operator):  # noqa: N801
+    bl_idname = "fmqm.decimate"
+    bl_label = "Decimate to Quality"
+    bl_description = (
+        "Copy the active object with a live Decimate modifier, as strong as the target allows. The original stays as "
+        "it is. Esc cancels"
+    )
+    bl_options: ClassVar = {"UNDO"}  # no REGISTER: adjusting the last operation would search all over again
+
+    noun = "Decimation"
+    stepper: Stepper[Reduced | FMQMError]
+    _name: str
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        reason = _why_not(context)
+        if reason:
+            cls.poll_message_set(reason)
+        return not reason
+
+    def begin(self, context: bpy.types.Context) -> bool:
+        fmqm, self._name = context.scene.fmqm, context.active_object.name_full
+        wish = Wish(
+            (round(fmqm.decimate.target, 4),),  # a property is float32: 0.9 must not become 0.90000004
+            fmqm.decimate.max_triangles if fmqm.decimate.limited else None,
+        )
+        try:
+            settings = metric_settings(fmqm.settings)
+        except FMQMError as error:
+            self.report({"ERROR"}, str(error))
+            return False
+        self.stepper = Stepper(_attempt(scene_reader([self._name], self._name), wish, settings))
+        return True
+
+    def finish(self, context: bpy.types.Context) -> set[str]:
+        """The copy and the path it took, in one undo step."""
+        reduced = self.stepper.result
+        if isinstance(reduced, FMQMError):
+            self.report({"WARNING"}, str(reduced))
+            return {"CANCELLED"}
+        found = reduced.outcomes[0].last
+        original = next((object_ for object_ in bpy.data.objects if object_.name_full == self._name), None)
+        if original is None:
+            self.report({"WARNING"}, f"{self._name} is gone, and what was found with it")
+            return {"CANCELLED"}
+        best = found.best
+        if not found.reached:
+            self.report(
+                {"WARNING"},
+                f"{self._name} misses {found.target:.2f} even with {best.triangles:,} triangles"
+                + ("" if best.fmqm is None else f" (FMQM {best.fmqm:.4f})"),
+            )
+            return {"CANCELLED"}
+        copy = decimated_copy(original, best.version.ratio, f"{original.name} FMQM {found.target:.2f}")
+        context.scene.fmqm.decimate.path = _path_text(found)
+        for object_ in context.selected_objects:
+            object_.select_set(False)
+        context.view_layer.objects.active = copy
+        copy.select_set(True)
+        self.report(
+            {"INFO"}, f"{copy.name}: {best.triangles:,} of {reduced.triangles:,} triangles, FMQM {best.fmqm:.4f}"
+        )
+        return {"FINISHED"}
+
+
+def _why_not(context: bpy.types.Context) -> str:
+    """Why there is nothing to decimate, for the greyed-out button; "" if there is."""
+    active = context.active_object
+    if session.job is not None:
+        return "A measurement is running"
+    if active is None or active.type != "MESH":
+        return "Make a mesh object the active one"
+    return "" if active.mode == "OBJECT" else "Leave the object's edit or paint mode"
+
+
+def _attempt(read: Reader, wish: Wish, settings: Settings) -> Work[Reduced | FMQMError]:
+    """The search, or why it could not be done."""
+    searching = reducing(read, wish, settings)
+    try:
+        while searching.step():
+            yield searching.progress
+    except FMQMError as error:
+        return error
+    return searching.result
+
+
+def _path_text(found: Found) -> str:
+    """Its versions, from the most triangles down; "about" where few patches were looked at."""
+    lines = []
+    for step in sorted(found.path, key=lambda step: (-step.triangles, step.quick)):
+        score = "nothing left" if step.fmqm is None else f"{step.fmqm:.4f}"
+        lines.append(f"{step.triangles:,} triangles: {'about ' if step.quick else ''}{score}")
+    return "\n".join(dict.fromkeys(lines))
+
+
+class FMQM_PT_decimate(bpy.types.Panel):  # noqa: N801
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "FMQM"
+    bl_parent_id = "FMQM_PT_main"
+    bl_idname = "FMQM_PT_decimate"
+    bl_label = "Decimate to Quality"
+    bl_options: ClassVar = {"DEFAULT_CLOSED"}
+    bl_order = 6
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, decimate = self.layout, context.scene.fmqm.decimate
+        layout.use_property_split, layout.use_property_decorate = True, False
+        layout.prop(decimate, "target", slider=True)
+        row = layout.row(heading="Max Triangles")
+        row.prop(decimate, "limited", text="")
+        number = row.row()
+        number.active = decimate.limited
+        number.prop(decimate, "max_triangles", text="")
+        row = layout.row()
+        row.operator_context = "INVOKE_DEFAULT"
+        row.operator(FMQM_OT_decimate.bl_idname, icon="MOD_DECIM")
+        if decimate.path:
+            column = layout.column(align=True)
+            column.scale_y = 0.8
+            for line in decimate.path.splitlines():
+                column.label(text=line, translate=False)
+
+
+CLASSES = (FMQM_OT_decimate, FMQM_PT_decimate)

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the buttons with long work share: in the window they work between redraws and can be cancelled."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import bpy
+
+from ..metric.score import Stepper
+from . import session, watch
+
+SLICE = 0.035  # seconds of work per tick of the timer: the window stays smooth
+SHOWN_EVERY = 0.2  # seconds between redraws of the progress
+TICK = 0.005  # seconds between ticks, for Blender to draw and listen
+
+
+class SteppedOperator:
+    """A part of operators that run a stepper; called from Python they run it at once.
+
+    An operator's own begin makes the stepper, or reports why not and returns False; finish uses its result.
+
+    Attributes:
+        noun: what is cancelled, for its message.
+    """
+
+    noun = "Measurement"
+    stepper: Stepper[Any]
+    report: Callable[[set[str], str], None]  # the operator's
+    _job: session.Job
+    _shown: float = 0.0
+
+    def begin(self, context: bpy.types.Context) -> bool:
+        raise NotImplementedError
+
+    def finish(self, context: bpy.types.Context) -> set[str]:
+        raise NotImplementedError
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        if not self.begin(context):
+            return {"CANCELLED"}
+        self.stepper.run()
+        return self.finish(context)
+
+    def invoke(self, context: bpy.types.Context, _: bpy.types.Event) -> set[str]:
+        if bpy.app.background or context.window is None:
+            return self.execute(context)
+        if not self.begin(context):
+            return {"CANCELLED"}
+        window_manager, stepper, workspace = context.window_manager, self.stepper, context.workspace
+        timer = window_manager.event_timer_add(TICK, window=context.window)
+
+        def stop() -> None:
+            """Once; from wherever the end comes."""
+            if session.job is not job:
+                return
+            session.job = None
+            stepper.cancel()
+            window_manager.event_timer_remove(timer)
+            workspace.status_text_set(None)
+            watch.redraw()
+            watch.soon()
+
+        self._job = job = session.job = session.Job(stop)
+        session.longest_tick = 0.0
+        window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        job = self._job
+        if session.job is not job:  # another file, or the add-on was disabled
+            return {"CANCELLED"}
+        if job.cancelled or (event.type == "ESC" and event.value == "PRESS"):
+            job.stop()
+            self.report({"INFO"}, f"{self.noun} cancelled")
+            return {"CANCELLED"}
+        if event.type != "TIMER":
+            return {"PASS_THROUGH"}
+        try:
+            more = self._slice()
+        except BaseException:
+            job.stop()
+            raise
+        if more:
+            self._show(context, job)
+            return {"PASS_THROUGH"}
+        job.stop()
+        return self.finish(context)
+
+    def cancel(self, _: bpy.types.Context) -> None:
+        """Blender ends the operator: a window was closed, another file was opened."""
+        self._job.stop()
+
+    def _slice(self) -> bool:
+        """Some milliseconds of work; whether there is more."""
+        began = time.perf_counter()
+        more = True
+        while more and time.perf_counter() - began < SLICE:
+            more = self.stepper.step()
+        session.longest_tick = max(session.longest_tick, time.perf_counter() - began)
+        return more
+
+    def _show(self, context: bpy.types.Context, job: session.Job) -> None:
+        """Progress in sidebar and status bar, some times a second."""
+        progress = self.stepper.progress
+        job.progress = progress.done
+        now = time.perf_counter()
+        if progress.stage == job.text and now - self._shown < SHOWN_EVERY:
+            return
+        self._shown, job.text = now, progress.stage
+        context.workspace.status_text_set(f"FMQM: {job.text}, {100 * job.progress:.0f} %        Esc: Cancel")
+        watch.redraw()
