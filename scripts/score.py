@@ -12,7 +12,6 @@ import argparse
 import contextlib
 import os
 import shutil
-import signal
 import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -31,7 +30,7 @@ from fmqm_addon.batch.rows import Options, Row, Task
 from fmqm_addon.batch.run import score_tasks, units_of, work_off
 from fmqm_addon.batch.sources import glob_files, lod_rows, plain_rows, read_manifest
 from fmqm_addon.batch.workers import Limits, adopt, score_with_workers, workers_command
-from fmqm_addon.blender.process import blender_version, require_bpy, take_stdout
+from fmqm_addon.blender.process import blender_version, require_bpy, stop_on_signals, take_stdout
 from fmqm_addon.blender.space import SPACES
 from fmqm_addon.metric.errors import FMQMError, SettingsError
 from fmqm_addon.metric.settings import CENTERS, COLOR_SPACES, POOLINGS, PRESETS, SETTING_NAMES, Settings
@@ -345,7 +344,8 @@ def _score_tasks(
         score_with_workers(tasks, command, folder, args.jobs, limits, journal, log)
     elif tasks:
         require_bpy()
-        return score_tasks(tasks, options, journal, Log(PROGRAM, units_of(tasks), len(tasks), args.quiet))
+        log = Log(PROGRAM, units_of(tasks), len(tasks), args.quiet)
+        return score_tasks(tasks, options, journal, log)
     return None
 
 
@@ -402,8 +402,7 @@ def run() -> None:
     argv = sys.argv[1:]
     if Path(sys.argv[0]).name != Path(__file__).name:
         argv = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
-    for number in (signal.SIGINT, signal.SIGTERM):  # Blender sets its own; a build server's stop is a Ctrl-C
-        signal.signal(number, signal.default_int_handler)
+    stop_on_signals()
     try:
         code = main(argv, take_stdout())
     except KeyboardInterrupt:

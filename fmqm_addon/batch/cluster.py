@@ -50,16 +50,16 @@ def score_on_cluster(
                           retries=RETRIES): part
             for part in parts
         }  # fmt: skip
-        for future in distributed.as_completed(list(sent)):
+        for future in distributed.as_completed(list(sent), loop=client.loop):
             part = sent.pop(future)
-            failure = future.exception()
-            if failure is None:
+            if future.status == "finished":
                 for key, record, lost in future.result():
                     journal.done(key, record, lost)
                     log.scored(record)
-            else:
+            else:  # error, or cancelled where the scheduler has gone
+                why = str(future.exception()).partition("\n")[0] if future.status == "error" else future.status
                 for task in part:
-                    text = f"{task.row.distorted}: its task failed on the cluster ({str(failure).splitlines()[0]})"
+                    text = f"{task.row.distorted}: its task failed on the cluster ({why})"
                     record = pair_record(PairScore(task.row.reference, task.row.distorted, error=text))
                     journal.done(task.key, record, lost=True)
                     log.scored(record)

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from ..blender.process import stops_wait
 from ..metric.errors import FMQMError
 from ..report.explain import explain, where
 from ..report.pair import PairScore, pair_record
@@ -166,7 +167,8 @@ class _Scorer:
         from ..blender.material import load_texture
 
         try:
-            return load_placed(row.path(name), load_texture(row.path(image)) if image else None)
+            with stops_wait():
+                return load_placed(row.path(name), load_texture(row.path(image)) if image else None)
         finally:
             self._spent("load", time.perf_counter() - began)
 

@@ -7,7 +7,10 @@ import contextlib
 import importlib
 import importlib.metadata
 import os
+import signal
 import sys
+import threading
+from collections.abc import Iterator
 from typing import TextIO
 
 from ..metric.errors import FMQMError
@@ -45,6 +48,38 @@ def blender_version() -> str:
             return importlib.metadata.version("bpy")
     require_bpy()
     return ".".join(map(str, sys.modules["bpy"].app.version))
+
+
+def stop_on_signals() -> None:
+    """Makes a build server's stop the same as Ctrl-C, also under Blender, which sets its own handlers."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _stop)
+
+
+@contextlib.contextmanager
+def stops_wait() -> Iterator[None]:
+    """Holds a stop back while Blender opens a file, since the Python that it runs then swallows it; not a second one.
+
+    Raises:
+        KeyboardInterrupt: at the end, if there was one.
+    """
+    _opening.set()
+    try:
+        yield
+    finally:
+        _opening.clear()
+    if _stopped.is_set():
+        raise KeyboardInterrupt
+
+
+_opening, _stopped = threading.Event(), threading.Event()
+
+
+def _stop(number: int, frame: object) -> None:
+    waits = _opening.is_set() and not _stopped.is_set()
+    _stopped.set()
+    if not waits:
+        raise KeyboardInterrupt
 
 
 def take_stdout() -> TextIO:

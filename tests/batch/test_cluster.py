@@ -66,7 +66,7 @@ def test_all_pairs_are_scored_once_though_a_worker_is_killed(
     journal = assets / "far.json.journal.jsonl"
     end = time.monotonic() + 60
     while not journal.exists() or b"done" not in journal.read_bytes():
-        assert run.poll() is None and time.monotonic() < end
+        assert run.poll() is None and time.monotonic() < end, run.communicate()[1]
         time.sleep(0.02)
     workers[0].kill()
     before = journal.read_bytes().count(b'{"done"')
