@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whose loss it is: pairs that differ in one thing only, and how that is found out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fmqm_addon.blender.attribution import Attribution, attribute
+from fmqm_addon.blender.files import load_mesh
+from fmqm_addon.blender.measure import Measurement
+from fmqm_addon.metric.settings import PRESETS, Settings
+from fmqm_addon.metric.surface import MeshArrays
+
+from .script import noise, score, strict_json, write_png, write_torus
+
+SMALL = Settings(samples=6400, patches=40, color_units=20)
+
+
+@pytest.fixture(scope="module")
+def torus(tmp_path_factory: pytest.TempPathFactory) -> dict[str, MeshArrays]:
+    """A torus, one with another texture, one of another shape, one that differs in both."""
+    folder = tmp_path_factory.mktemp("torus")
+    write_png(folder / "a.png", noise(32, seed=1))
+    write_png(folder / "b.png", noise(32, seed=2))
+    paths = {
+        "reference": write_torus(folder, "reference", "a.png"),
+        "texture": write_torus(folder, "texture", "b.png"),
+        "geometry": write_torus(folder, "geometry", "a.png", shake=0.02),
+        "both": write_torus(folder, "both", "b.png", shake=0.02),
+    }
+    return {name: load_mesh(str(path)) for name, path in paths.items()}
+
+
+def attributed(reference: MeshArrays, distorted: MeshArrays, settings: Settings = SMALL) -> Attribution:
+    measurement = Measurement(reference, settings)
+    measurement.prepare().run()
+    return attribute(measurement, reference, distorted, measurement.compare(distorted).run()).run()
+
+
+def test_each_loss_alone_is_exactly_one_part(torus: dict[str, MeshArrays]) -> None:
+    texture = attributed(torus["reference"], torus["texture"])
+    assert texture.geometry_loss == 0 and texture.texture_loss > 0.1
+    assert texture.phrase == "most of the loss is the texture"
+    geometry = attributed(torus["reference"], torus["geometry"])
+    assert geometry.texture_loss == 0 and geometry.geometry_loss > 0.02
+    assert geometry.phrase == "most of the loss is the geometry"
+    assert texture.how == geometry.how == "materials"
+
+
+def test_parts_of_a_mixed_loss_are_those_of_the_two_alone(torus: dict[str, MeshArrays]) -> None:
+    both = attributed(torus["reference"], torus["both"])
+    assert both.geometry_loss == attributed(torus["reference"], torus["geometry"]).geometry_loss
+    assert both.texture_loss == attributed(torus["reference"], torus["texture"]).texture_loss
+
+
+def test_nothing_lost(torus: dict[str, MeshArrays]) -> None:
+    nothing = attributed(torus["reference"], torus["reference"])
+    assert (nothing.geometry_loss, nothing.texture_loss, nothing.mostly) == (0, 0, "nothing")
+
+
+def test_a_mesh_unwrapped_anew_is_painted_from_nearest_points(torus: dict[str, MeshArrays]) -> None:
+    """Its texture coordinates are shifted by half a texture, of which the same image makes another look."""
+    shifted = replace(torus["reference"], corners=torus["reference"].corners + np.float32(0.5))
+    found = attributed(torus["reference"], shifted)
+    assert found.how == "nearest points"
+    assert found.geometry_loss < 0.01 and found.texture_loss > 0.1
+
+
+def test_materials_are_told_by_name_then_by_place(torus: dict[str, MeshArrays]) -> None:
+    """Two materials that have changed places look as before."""
+    whole = torus["reference"]
+    half = (np.arange(len(whole.triangles)) % 2).astype(np.int64)
+    first, second = (replace(torus[key].materials[0], name=key) for key in ("reference", "texture"))
+    reference = replace(whole, material=half, materials=(first, second))
+    swapped = replace(whole, material=1 - half, materials=(second, first))
+    assert attributed(reference, swapped).texture_loss == 0
+    renamed = replace(reference, materials=(replace(first, name="x"), replace(second, name="y")))
+    found = attributed(reference, renamed)
+    assert (found.geometry_loss, found.texture_loss, found.how) == (0, 0, "materials")
+
+
+@pytest.mark.parametrize(
+    "losses, phrase",
+    [
+        ((0.0, 0.01), "there is hardly any loss"),
+        ((0.3, 0.1), "most of the loss is the geometry"),
+        ((0.1, 0.3), "most of the loss is the texture"),
+        ((0.2, 0.3), "geometry and texture share the loss"),
+    ],
+)
+def test_phrases(losses: tuple[float, float], phrase: str) -> None:
+    assert Attribution(*losses, "materials").phrase == phrase
+
+
+@pytest.mark.parametrize(
+    "kind, mostly", [("ds_3", "texture"), ("tmc_3", "texture"), ("gn_3", "geometry"), ("swt_3", "geometry")]
+)
+def test_real_models(shared_data: Path, kind: str, mostly: str) -> None:
+    """Smaller texture, JPEG; noise, decimation."""
+    reference = load_mesh(str(shared_data / "objpng" / "spot" / "spot.obj"))
+    distorted = load_mesh(str(shared_data / "pairs" / "spot" / kind / "mesh.obj"))
+    found = attributed(reference, distorted, Settings(**PRESETS["fast"]))
+    parts = {"geometry": found.geometry_loss, "texture": found.texture_loss}
+    assert found.mostly == mostly and parts[mostly] > 0.05
+    assert sum(parts.values()) - parts[mostly] < 0.01
+
+
+def test_script_attributes_and_explains(tmp_path: Path) -> None:
+    write_png(tmp_path / "a.png", noise(32, seed=1))
+    reference = write_torus(tmp_path, "reference", "a.png")
+    shaken = write_torus(tmp_path, "shaken", "a.png", shake=0.03)
+    flags = ("--samples", 3200, "--patches", 20, "--quiet", "--attribution", "--explain")
+    done = score(reference, shaken, tmp_path / "nowhere.obj", *flags, "--json", tmp_path / "out.json")
+    pair, failed = strict_json((tmp_path / "out.json").read_text(encoding="utf-8"))["pairs"]
+    assert pair["attribution"]["mostly"] == "geometry" and pair["attribution"]["texture_loss"] == 0
+    assert pair["explanation"] in done.stdout and "Most of the loss is the geometry" in pair["explanation"]
+    assert 0 < pair["where"]["below_mean"] < 1 and len(pair["where"]["worst"]) == 3
+    assert failed["explanation"] in done.stdout and failed["explanation"].startswith("Not scored: ")

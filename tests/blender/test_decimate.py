@@ -1,0 +1,246 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Good enough, found: the search, what it leaves behind, the files and the button."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Generator
+from pathlib import Path
+from typing import Any
+
+import bpy
+import pytest
+
+from fmqm_addon import ui
+from fmqm_addon.blender.decimate import (
+    DECIMATE,
+    LEAST_TRIANGLES,
+    TOLERANCE,
+    WELD,
+    Search,
+    Version,
+    Wish,
+    add_modifiers,
+    last_passing,
+    reducing,
+    scene_reader,
+)
+from fmqm_addon.blender.files import load_mesh
+from fmqm_addon.blender.reduced import EXPORTERS, save_version, texture_sizes
+from fmqm_addon.metric.errors import FMQMError, MeshError
+from fmqm_addon.metric.score import Progress
+from fmqm_addon.metric.settings import Settings
+from fmqm_addon.metric.surface import finish
+
+from . import scenes
+from .script import SCORE, noise, read_json, score, strict_json, write_png, write_torus
+
+DECIMATE_SCRIPT = SCORE.with_name("decimate.py")
+TINY = Settings(samples=6400, patches=50, color_units=20)  # above 40 patches: searched quickly, then confirmed
+SMALL = ("--samples", "6400", "--patches", "50", "--quiet")
+
+
+@pytest.fixture(scope="module")
+def torus(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """576 triangles with a texture of 64 x 64."""
+    folder = tmp_path_factory.mktemp("torus")
+    write_png(folder / "image.png", noise(64))
+    return write_torus(folder, "torus", "image.png", shake=0.02)
+
+
+def decimate(*arguments: object, cwd: Path | None = None) -> Any:
+    return score(*arguments, command=(sys.executable, str(DECIMATE_SCRIPT)), cwd=cwd)
+
+
+# --- The search ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("start, stride", [(0, 1), (50, 25), (99, 1), (30, 3)])
+@pytest.mark.parametrize("passing", [0, 1, 7, 50, 99, 100])
+def test_the_last_that_passes_is_found_from_anywhere(passing: int, start: int, stride: int) -> None:
+    asked = []
+
+    def passes(index: int) -> Generator[Progress, None, bool]:
+        asked.append(index)
+        yield Progress("", 0.0)
+        return index < passing
+
+    assert finish(last_passing(100, passes, start, stride)) == passing - 1
+    assert len(asked) == len(set(asked)) <= 16, "asks none twice, and not nearly all"
+    assert set(asked) >= {passing - 1, passing} & set(range(100)), "both sides of the edge have been looked at"
+
+
+def test_the_found_version_passes_and_the_next_cheaper_one_does_not() -> None:
+    monkey = scenes.monkey()
+    reduced = reducing(scene_reader([monkey.name], "it"), Wish((0.9, 0.8)), TINY).run()
+    for target, outcome in zip((0.9, 0.8), reduced.outcomes, strict=True):
+        found = outcome.last
+        assert found.reached and found.best.fmqm >= target > found.below.fmqm
+        assert not found.best.quick and not found.below.quick, "confirmed with all patches"
+        assert found.below.triangles >= found.best.triangles * (1 - TOLERANCE) - 2, "the next one"
+        assert any(step.quick for step in found.path), "searched with few patches"
+    first = reduced.outcomes[0].last
+    assert {first.best, first.below} <= set(first.path), "the path tells all"
+    assert reduced.outcomes[1].last.best.triangles < reduced.outcomes[0].last.best.triangles < reduced.triangles == 968
+
+
+def test_ratio_1_is_the_object_itself() -> None:
+    monkey = scenes.monkey()
+    search = Search(scene_reader([monkey.name], "it"), TINY)
+    finish(search.prepare())
+    found = finish(search.find(1.0, search.ratios()[:1]))
+    assert found.reached and found.best.fmqm == 1.0 and found.best.triangles == 968
+
+
+def test_a_target_that_the_most_triangles_allowed_miss() -> None:
+    monkey = scenes.monkey()
+    found = reducing(scene_reader([monkey.name], "it"), Wish((0.99,), max_triangles=100), TINY).run().outcomes[0].last
+    assert not found.reached and found.best.triangles <= 100 and found.below is None
+    with pytest.raises(MeshError, match="max-triangles is 3; at least 4 are wanted"):
+        reducing(scene_reader([monkey.name], "it"), Wish((0.99,), max_triangles=LEAST_TRIANGLES - 1), TINY).run()
+
+
+def test_searching_leaves_nothing_behind_even_when_it_is_cancelled_or_fails() -> None:
+    monkey = scenes.monkey()
+    before = scenes.blocks()
+    stepper = reducing(scene_reader([monkey.name], "it"), Wish((0.9,)), TINY)
+    while stepper.step() and stepper.progress.done < 0.5:
+        pass
+    stepper.cancel()
+    assert scenes.blocks() == before and not monkey.modifiers
+    stepper = reducing(scene_reader([monkey.name], "it"), Wish((0.9,)), TINY)
+    stepper.step()
+    stepper.step()
+    bpy.data.objects.remove(monkey)
+    with pytest.raises(FMQMError, match="Monkey: it is no longer in the file"):
+        stepper.run()
+
+
+def test_vertices_that_importers_split_are_welded_first() -> None:
+    """Collapsing edges of separate triangles would tear holes."""
+    corners = [scenes.CUBE_CORNERS[k] for face in scenes.CUBE_FACES for k in face]
+    split = scenes.add("Split", corners, [tuple(range(k, k + 4)) for k in range(0, 24, 4)])
+    add_modifiers(split, 0.5)
+    assert [modifier.name for modifier in split.modifiers] == [WELD, DECIMATE]
+    mesh = split.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    assert len(mesh.vertices) <= 8, "joined at the corners"
+    whole = scenes.cube()
+    add_modifiers(whole, 0.5)
+    assert [modifier.name for modifier in whole.modifiers] == [DECIMATE], "not where it would do nothing"
+    add_modifiers(whole, 1.0)
+    assert len(whole.modifiers) == 1, "ratio 1 leaves it alone"
+
+
+# --- Files -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", EXPORTERS)
+def test_a_saved_version_is_what_was_measured(torus: Path, tmp_path: Path, kind: str) -> None:
+    out = tmp_path / f"lod{kind}"
+    save_version(str(torus), Version(0.5, 16), str(out))
+    assert 250 <= len(load_mesh(str(out)).triangles) <= 288
+    if kind not in {".ply", ".stl"}:
+        assert texture_sizes(str(out))[0] == 16
+    kept = {".obj": {"lod.mtl", "lod_image.png"}, ".usd": {"textures"}}.get(kind, set())
+    assert {path.name for path in tmp_path.iterdir()} == {out.name} | kept, "no temporary files, nobody else's names"
+    assert texture_sizes(str(torus))[0] == 64, "the original keeps its texture"
+    if kind == ".blend":
+        scenes.clear()
+        bpy.ops.wm.open_mainfile(filepath=str(out))
+        assert [modifier.name for modifier in bpy.data.objects["torus"].modifiers][-1] == DECIMATE, "live"
+
+
+def test_script_decimates_to_a_target_and_says_how(torus: Path, tmp_path: Path) -> None:
+    out, report = tmp_path / "out.glb", tmp_path / "out.json"
+    done = decimate(torus, "--target-fmqm", 0.85, "--target-texture", 0.7, "-o", out, "--json", report, *SMALL)
+    assert done.returncode == 0, done.stderr
+    found = read_json(report)["found"][0]
+    geometry, texture = found["geometry"], found["texture"]
+    assert geometry["reached"] and geometry["best"]["FMQM"] >= 0.85 > geometry["below"]["FMQM"]
+    assert (
+        texture["reached"] and texture["best"]["FMQM"] >= 0.7 and texture["best"]["ratio"] == geometry["best"]["ratio"]
+    )
+    assert done.stdout.count("found") == 2 and f"{geometry['best']['FMQM']:.4f}" in done.stdout
+    again = score(torus, out, "--samples", 6400, "--patches", 50, "--json", "-", "--quiet")
+    assert strict_json(again.stdout)["pairs"][0]["FMQM"] == pytest.approx(texture["best"]["FMQM"], abs=0.002)
+
+
+def test_script_makes_a_chain(torus: Path, tmp_path: Path) -> None:
+    done = decimate(torus, "--chain", "0.8,0.6", "-o", tmp_path / "rock.ply", *SMALL)
+    assert done.returncode == 0, done.stderr
+    first, second = (len(load_mesh(str(tmp_path / f"rock_LOD{level}.ply")).triangles) for level in (1, 2))
+    assert 576 > first > second
+
+
+def test_script_says_that_a_target_is_missed(torus: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out.glb"
+    done = decimate(torus, "--target-fmqm", 0.99, "--max-triangles", 50, "-o", out, "--json", "-", *SMALL)
+    assert done.returncode == 1 and not out.exists()
+    assert len(done.stderr.splitlines()) == 1 and "0.99 is missed even with the 50 triangles" in done.stderr
+    assert json.loads(done.stdout)["found"][0]["geometry"]["reached"] is False
+
+
+@pytest.mark.parametrize(
+    "arguments, code, text",
+    [
+        (("nowhere.glb", "--target-fmqm", 0.9), 1, "nowhere.glb: no such file"),
+        (("torus.obj", "--target-fmqm", 0.9, "-o", "out.gltf"), 1, "out.gltf: unknown file ending .gltf"),
+        (("torus.obj", "--target-fmqm", 0.9, "-o", "no/out.glb"), 1, "the folder no does not exist"),
+        (("torus.obj",), 2, "nothing is asked for"),
+        (("torus.obj", "--target-fmqm", 1.5), 2, "the target is 1.5; it must be above 0 and at most 1"),
+        (("torus.obj", "--target-fmqm", "nan"), 2, "the target is nan"),
+        (("torus.obj", "--chain", "0.9,x"), 2, "0.9,x is no list of numbers"),
+        (("torus.obj", "--target-fmqm", 0.9, "--chain", "0.9"), 2, "both given"),
+        (("torus.obj", "--target-texture", 0.9, "--max-triangles", 9), 2, "--max-triangles needs"),
+    ],
+)
+def test_script_says_what_is_wrong_in_one_line(
+    torus: Path, arguments: tuple[object, ...], code: int, text: str
+) -> None:
+    done = decimate(*arguments, "--quiet", cwd=torus.parent)
+    assert (done.returncode, len(done.stderr.splitlines())) == (code, 1) and text in done.stderr, done.stderr
+
+
+def test_real_models(shared_data: Path, tmp_path: Path) -> None:
+    """The cat's glb splits its vertices at seams and names WebP textures."""
+    model, out = shared_data / "egyptian_cat" / "egyptian_cat.glb", tmp_path / "cat.glb"
+    done = decimate(model, "--target-fmqm", 0.8, "--preset", "fast", "--quiet", "-o", out)
+    assert done.returncode == 0, done.stderr
+    again = score(model, out, "--preset", "fast", "--json", "-", "--quiet")
+    assert 0.8 <= strict_json(again.stdout)["pairs"][0]["FMQM"] < 0.81
+
+
+# --- The button ------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def addon() -> Generator[None, None, None]:
+    ui.register()
+    yield
+    ui.unregister()
+
+
+@pytest.mark.usefixtures("addon")
+def test_button_makes_a_copy_with_a_live_modifier() -> None:
+    monkey = scenes.monkey("Rock")
+    fmqm = bpy.context.scene.fmqm
+    fmqm.settings.samples, fmqm.settings.patches = 6400, 50
+    assert bpy.ops.fmqm.decimate() == {"FINISHED"}
+    copy = bpy.context.active_object
+    assert copy.name == "Rock FMQM 0.90" and copy.data == monkey.data and copy.matrix_world == monkey.matrix_world
+    assert 0 < copy.modifiers[DECIMATE].ratio < 1 and not monkey.modifiers
+    assert "triangles: about 0." in fmqm.decimate.path
+    fmqm.decimate.limited, fmqm.decimate.max_triangles = True, 20
+    before = scenes.blocks()
+    assert bpy.ops.fmqm.decimate() == {"CANCELLED"} and scenes.blocks() == before, "missed: nothing is made"
+
+
+@pytest.mark.usefixtures("addon")
+def test_button_says_why_it_is_grey() -> None:
+    with pytest.raises(RuntimeError, match="Make a mesh object the active one"):
+        bpy.ops.fmqm.decimate()
+    scenes.monkey()
+    bpy.ops.object.mode_set(mode="EDIT")
+    with pytest.raises(RuntimeError, match="Leave the object's edit or paint mode"):
+        bpy.ops.fmqm.decimate()
