@@ -47,7 +47,7 @@ $(VENV)/runs: requirements.txt
 	$(RUN) -m pip install --quiet --disable-pip-version-check -r requirements.txt
 	@touch $@
 
-$(VENV)/tests: requirements-dev.txt $(VENV)/runs
+$(VENV)/tests: requirements-dev.txt requirements-cluster.txt $(VENV)/runs
 	$(RUN) -m pip install --quiet --disable-pip-version-check -r requirements-dev.txt
 	@touch $@
 
