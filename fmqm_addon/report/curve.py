@@ -13,7 +13,7 @@ from .picture import shorten
 WIDTH, HEIGHT = 460, 270
 LEFT, RIGHT, TOP, BOTTOM = 44, 16, 28, 44  # margins
 LABEL = 22  # characters of a level's name
-TICKS = 4  # marks of an axis at least, where the range has room for them
+TICKS = 3  # marks of an axis at least, where there are so many round numbers
 
 
 @dataclass(frozen=True)
@@ -78,14 +78,14 @@ def curve_svg(levels: Sequence[Level], cost: str) -> str:
 
 
 def _ticks(low: float, high: float) -> list[float]:
-    """Round numbers from low to high: powers of ten, then twice and five times these too."""
+    """Round numbers from low to high, as few as will do; both ends themselves where there are none."""
     decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
-    for digits in ((1,), (1, 3), (1, 2, 5), tuple(range(1, 10))):
+    for digits in ((1,), (1, 3), (1, 2, 5), (1, 1.5, 2, 3, 4, 5, 7)):
         found = [digit * 10.0**decade for decade in decades for digit in digits]
         found = [value for value in found if low * 0.999 <= value <= high * 1.001]
         if len(found) >= TICKS:
-            break
-    return found
+            return found
+    return [low, high] if len(found) < 2 else found
 
 
 def _short(value: float) -> str:

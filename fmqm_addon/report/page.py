@@ -213,9 +213,10 @@ def _curve(reference: str, chain: Sequence[_Cost], costs: Sequence[tuple[float, 
 
 
 def _pair(number: int, record: Record) -> str:
+    name, path = _name(record), record["distorted"]
+    whole_path = "" if name == path else f'<p class="faint">{_text(path)}</p>'
     parts = [
-        f'<div class="title"><div><h3>{_text(_name(record))}</h3>'
-        f'<p class="faint">{_text(record["distorted"])}</p></div>'
+        f'<div class="title"><div><h3>{_text(name)}</h3>{whole_path}</div>'
         f'<p class="score"><span class="faint">FMQM</span> {_score(record, "FMQM")}</p></div>',
         f'<p class="bad">Below its threshold, {record["fail_under"]:g}.</p>' if below(record) else "",
     ]
@@ -249,7 +250,7 @@ def _attribution(attribution: Record | None) -> str:
     if attribution is None:
         return ""
     return (
-        f'<p class="note">{escape(attribution["says"][:1].upper() + attribution["says"][1:])}: '
+        f'<p class="note">{escape(attribution["phrase"][:1].upper() + attribution["phrase"][1:])}: '
         f"{attribution['geometry_loss']:.3f} of FMQM with the geometry alone distorted, "
         f"{attribution['texture_loss']:.3f} with the texture alone.</p>"
     )

@@ -249,7 +249,7 @@ def test_the_page_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
 
 
 def test_words_losses_and_thresholds_are_shown_where_there_are_any() -> None:
-    losses = {"geometry_loss": 0.01, "texture_loss": 0.4321, "says": "most of the loss is the texture"}
+    losses = {"geometry_loss": 0.01, "texture_loss": 0.4321, "phrase": "most of the loss is the texture"}
     told = Page(record(explanation="It looks bad.", attribution=losses, fail_under=0.75))
     for text in (
         "It looks bad.",
@@ -279,7 +279,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-FILES = ("ref.obj", "lod1.obj", "cut.glb", "lod2.obj", *SMALL)
+FILES = ("ref.obj", "lod1.obj", "cut.glb", "lod2.obj", *SMALL, "--attribution", "--explain")
 
 
 def files(folder: Path) -> dict[str, bytes]:
