@@ -193,9 +193,9 @@ def test_names_from_strangers_stay_text() -> None:
         record("b.glb", reference=HOSTILE, pictures=costs(20, 1 << 20)),
     )
     harmless = Page(
-        record("a", reference="r", warnings=["w"], trust=json.loads(json.dumps(trust).replace("<script>", "")),
+        record("x/a", reference="r", warnings=["w"], trust=json.loads(json.dumps(trust).replace("<script>", "")),
                pictures=costs(10, 1 << 20)),
-        record("a", score=None, id="aa", reference="r", error="e"),
+        record("x/a", score=None, id="aa", reference="r", error="e"),
         record("b.glb", reference="r", pictures=costs(20, 1 << 20)),
     )  # fmt: skip
     assert [tag for tag, _ in shown.tags] == [tag for tag, _ in harmless.tags]
