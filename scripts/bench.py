@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where the time goes: every stage of whole pairs, beside what the tree queries alone cost in the same run.
 
-    python scripts/bench.py [--growth] [--case REFERENCE DISTORTED] [--decimated REFERENCE] ...
+    python scripts/bench.py [--growth] [--case REFERENCE DISTORTED] [--decimated REFERENCE] [--batch] ...
 
 Without cases it measures generated surfaces. Each pair is scored in a process of its own, as a user would.
 The floor is the time of plain Python loops of nearest-point and ray-parity queries on both surfaces, along
@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -47,12 +48,13 @@ def main() -> int:
     parser.add_argument(
         "--samples", action="store_true", help="a generated surface at 50, 100 and 200 thousand samples"
     )
+    parser.add_argument("--batch", action="store_true", help="40 pairs with 1 and 2 jobs, and the parent's memory")
     parser.add_argument("--part", nargs="+", help=argparse.SUPPRESS)  # one of PARTS, in a process of its own
     args = parser.parse_args()
     if args.part:
         PARTS[args.part[0]](*args.part[1:])
         return 0
-    everything = not (args.case or args.decimated or args.growth or args.samples)
+    everything = not (args.case or args.decimated or args.growth or args.samples or args.batch)
     print(f"{'pair':34}{'triangles':>10}" + "".join(f"{stage:>9}" for stage in STAGES) + "    floor  ratio    peak")
     with tempfile.TemporaryDirectory() as folder:
         small = str(Path(folder) / "small.blend")
@@ -72,6 +74,10 @@ def main() -> int:
             part("decimate", small, small_lod)
             for samples in (50_000, 100_000, 200_000):
                 measure(f"generated, {samples:,} samples", small, small_lod, samples)
+        if args.batch or everything:
+            part("generate", str(GENERATED[0]), small)
+            part("decimate", small, small_lod)
+            measure_batches(small, small_lod)
     return 0
 
 
@@ -100,6 +106,36 @@ def measure(name: str, reference: str, distorted: str, samples: int = 200_000) -
     peak = usage.ru_maxrss / 2**20  # kilobytes on Linux
     ratio = seconds["total"] / floor
     print(f"{name:34}{triangles:10.0f}{numbers}{floor:9.2f}{ratio:7.2f}{peak:6.2f} GB", flush=True)
+
+
+def measure_batches(reference: str, distorted: str) -> None:
+    """Prints what a second job gains, and what more pairs cost the parent of the jobs."""
+    middling = ["--samples", "20000", "--patches", "100"]
+    tiny = ["--samples", "640", "--patches", "20", "--color-units", "5"]
+    times = [run_batch(reference, distorted, 40, jobs, middling)[0] for jobs in (1, 2)]
+    print(f"40 pairs: {times[0]:.1f} s with 1 job, {times[1]:.1f} s with 2: {times[0] / times[1]:.2f} times faster")
+    few, many = (run_batch(reference, distorted, pairs, 2, tiny)[1] for pairs in (40, 200))
+    print(f"peak memory of the parent: {few:.1f} MB for 40 pairs, {many:.1f} MB for 200", flush=True)
+
+
+def run_batch(reference: str, distorted: str, pairs: int, jobs: int, flags: list[str]) -> tuple[float, float]:
+    """Wall seconds of a batch, and the peak of its parent's own memory in MB, as Linux tells it."""
+    with tempfile.TemporaryDirectory() as folder:
+        manifest = Path(folder) / "pairs.json"
+        rows = [{"reference": reference, "distorted": distorted, "seed": seed} for seed in range(pairs)]
+        manifest.write_text(json.dumps(rows), encoding="utf-8")
+        command = [sys.executable, str(ROOT / "scripts" / "score.py"), "--manifest", str(manifest), *flags]
+        outputs = ["--jobs", str(jobs), "--json", str(Path(folder) / "all.json"), "--quiet"]
+        began = time.perf_counter()
+        process = subprocess.Popen([*command, *outputs], stdout=subprocess.DEVNULL)
+        peak = 0.0
+        while process.poll() is None:
+            found = re.search(r"VmHWM:\s+(\d+) kB", Path(f"/proc/{process.pid}/status").read_text(encoding="ascii"))
+            peak = int(found[1]) / 1000 if found else peak
+            time.sleep(0.05)
+        if process.returncode:
+            raise RuntimeError(f"the batch of {pairs} pairs ended with {process.returncode}")
+        return time.perf_counter() - began, peak
 
 
 def query_floor(reference: str, distorted: str, samples: str) -> None:
