@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..metric.errors import FMQMError, MeshError
 from ..metric.score import COLUMNS, Progress, Stepper, Work
 from ..metric.settings import FAST_SCORED_PATCHES, Settings
-from ..metric.surface import MeshArrays
+from ..metric.surface import MeshArrays, weld
 from .measure import Measurement
 from .snapshot import placed
 
@@ -327,8 +327,8 @@ def add_modifiers(object_: bpy.types.Object, ratio: float) -> None:
         return
     extent = _split_extent(object_.data)
     if extent:
-        weld = object_.modifiers.new(WELD, "WELD")
-        weld.merge_threshold = WELD_DISTANCE * extent
+        joining = object_.modifiers.new(WELD, "WELD")
+        joining.merge_threshold = WELD_DISTANCE * extent
     decimate = object_.modifiers.new(DECIMATE, "DECIMATE")
     decimate.ratio = ratio
 
@@ -352,6 +352,7 @@ def _split_extent(mesh: bpy.types.Mesh) -> float:
     """The longest side of a mesh's box where some of its vertices coincide, else 0."""
     positions: NDArray[np.float32] = np.empty((len(mesh.vertices), 3), np.float32)
     mesh.vertices.foreach_get("co", positions.reshape(-1))
-    if not len(positions) or len(np.unique(positions, axis=0)) == len(positions):
+    joined, _ = weld(positions.astype(np.float64), np.empty((0, 3), np.int64))
+    if len(joined) == len(positions):
         return 0.0
     return float((positions.max(axis=0) - positions.min(axis=0)).max())
