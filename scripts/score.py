@@ -252,9 +252,10 @@ class Run:
 
     def _load(self, spec: str, image: str | None) -> Placed:
         from fmqm_addon.blender.files import load_placed
-        from fmqm_addon.blender.material import load_texture
+        from fmqm_addon.blender.images import load_texture
+        from fmqm_addon.blender.material import Reading
 
-        return load_placed(spec, load_texture(image) if image else None)
+        return load_placed(spec, Reading(texture=load_texture(image) if image else None))
 
     def _work(self, stepper: Stepper[T], index: int, text: str, seconds: dict[str, float]) -> T:
         """Runs a stepper to its end with its progress shown and its seconds added up by stage."""

@@ -10,9 +10,11 @@ from pathlib import Path
 
 import bpy
 
-from ..metric.color import Texture
 from ..metric.errors import FileError, FMQMError, MeshError
 from ..metric.surface import MeshArrays
+from .assets import check_object, scene_members
+from .material import Reading
+from .mesh import AS_FOUND
 from .snapshot import placed
 from .space import Placed
 from .truncated import check_alembic, check_ply
@@ -20,18 +22,18 @@ from .truncated import check_alembic, check_ply
 _OBJECT_IN_BLEND = re.compile(r"(.*?\.blend):(.+)", re.IGNORECASE | re.DOTALL)
 
 
-def load_mesh(spec: str, texture: Texture | None = None) -> MeshArrays:
+def load_mesh(spec: str, reading: Reading = AS_FOUND) -> MeshArrays:
     """The asset in a file as one mesh in its world frame; as load_placed."""
-    return load_placed(spec, texture).world()
+    return load_placed(spec, reading).world()
 
 
-def load_placed(spec: str, texture: Texture | None = None) -> Placed:
+def load_placed(spec: str, reading: Reading = AS_FOUND) -> Placed:
     """The asset in a file as one mesh, with its place; nothing stays in the session.
 
     Args:
         spec: a path, or "file.blend:Object name" for one object, hidden or not. Of a whole file the
-            render-visible meshes count.
-        texture: replaces the base-color images of the whole asset.
+            render-visible objects of the active scene count.
+        reading: how the materials are read.
 
     Raises:
         FileError: the file is missing, unreadable or of an unknown kind, or has no such object.
@@ -40,11 +42,11 @@ def load_placed(spec: str, texture: Texture | None = None) -> Placed:
     path, object_name = split_spec(spec)
     try:
         open_file(path)
-        objects = [_named(object_name, path)] if object_name else measured_objects()
+        objects = [_named(object_name, path)] if object_name else scene_members()
         try:
             if not objects:
                 raise MeshError("no mesh in it; a surface is wanted")
-            return placed(objects, object_name or Path(path).name, texture)
+            return placed(objects, object_name or Path(path).name, reading)
         except FMQMError as error:
             raise type(error)(f"{spec}: {error}") from error
     finally:
@@ -121,26 +123,11 @@ def _named(name: str, path: str) -> bpy.types.Object:
     found = bpy.data.objects.get(name)
     if found is None:
         raise FileError(f"{path}: no object named {name} in it")
-    if found.type != "MESH":
-        raise MeshError(f"{path}:{name}: the object is of type {found.type.lower()}; a mesh is wanted")
+    try:
+        check_object(found)
+    except MeshError as error:
+        raise MeshError(f"{path}:{error}") from error
     return found
-
-
-def measured_objects() -> list[bpy.types.Object]:
-    """The render-visible mesh objects of the active scene, by name: the order must not depend on the file's."""
-    visible: dict[str, bpy.types.Object] = {}
-
-    def visit(layer: bpy.types.LayerCollection) -> None:
-        if layer.exclude or layer.collection.hide_render:
-            return
-        for object_ in layer.collection.objects:
-            if object_.type == "MESH" and not object_.hide_render:
-                visible[object_.name_full] = object_
-        for child in layer.children:
-            visit(child)
-
-    visit(bpy.context.view_layer.layer_collection)
-    return [visible[name] for name in sorted(visible)]
 
 
 def _last_line(error: RuntimeError) -> str:
