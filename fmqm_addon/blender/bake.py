@@ -12,16 +12,16 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..metric.color import Material, Texture, encode_srgb
+from ..metric.color import ImageAlpha, Material, Opacity, Texture, encode_srgb
 from ..metric.errors import MeshError
 from ..metric.spatial import Floats
 from ..metric.surface import triangle_areas
-from .emission import Shine, shining
+from .emission import Shine, is_opaque, shining
 from .layout import Layout, new_layout, own_layout
 from .material import Layer, Look
 
 _MARGIN = 8  # pixels around the parts of an own UV map, for bilinear lookups at their edges
-_OPAQUE = 254.5 / 255
+_OPAQUE = 254.5 / 255  # what rounds to 255
 _VALUES = {  # how the values of an attribute are called, and their number, by data type
     "FLOAT": ("value", 1, np.float32),
     "INT": ("value", 1, np.int32),
@@ -113,21 +113,26 @@ def _bake(
     stand_in.matrix_world = object_.matrix_world
     stand_in.color, stand_in.pass_index = object_.color, object_.pass_index
     scene.collection.objects.link(stand_in)
+    modeled = object_.original.data
+    if isinstance(modeled, bpy.types.Mesh) and len(modeled.vertices) == len(mesh.vertices):
+        _bend(stand_in, _values(modeled.attributes["position"]), temporary)
 
-    drawn = {}
-    for shine in Shine:
-        mesh.materials.clear()
-        for part in parts:
+    def draw(shine: Shine) -> list[NDArray[np.float32]]:
+        for index, part in enumerate(parts):
             material = shining(slots[part.slot].original, shine, temporary)
             target = material.node_tree.nodes.new("ShaderNodeTexImage")
             target.image = part.image
             material.node_tree.nodes.active = target
-            mesh.materials.append(material)
+            mesh.materials[index] = material
         _run(scene, stand_in, uv_map)
-        drawn[shine] = [_pixels(part.image) for part in parts]
+        return [_pixels(part.image) for part in parts]
+
+    colors = draw(Shine.COLOR)
+    opaque = all(is_opaque(slots[part.slot].node_tree) for part in parts)
+    weights = [np.ones_like(color) for color in colors] if opaque else draw(Shine.WEIGHT)
     return {
         part.slot: Baked(_look(slots[part.slot].name, part.layout, color, weight), part.layout.corners)
-        for part, color, weight in zip(parts, drawn[Shine.COLOR], drawn[Shine.WEIGHT], strict=True)
+        for part, color, weight in zip(parts, colors, weights, strict=True)
     }
 
 
@@ -170,19 +175,27 @@ def _look(name: str, layout: Layout, drawn: NDArray[np.float32], weights: NDArra
     """Divides the transparent out, and encodes.
 
     Args:
-        drawn, weights: (H, W, 3), row 0 at v = 0; see emission.Shine.
+        drawn, weights: (H, W, 4), row 0 at v = 0, the fourth 0 where nothing was drawn; see emission.Shine.
     """
-    opaque = np.minimum(weights[:, :, :1], 1)  # more than 1 where shaders are added
-    color = encode_srgb(np.divide(drawn, opaque, out=np.zeros_like(drawn), where=opaque > 0))
-    layout.fill(color)
-    texture = Texture(_bytes(color), extension="extend")
+    weight = np.minimum(weights[:, :, :1], 1)  # more than 1 where shaders are added
+    values = np.empty_like(drawn)
+    values[:, :, :3] = encode_srgb(
+        np.divide(drawn[:, :, :3], weight, out=np.zeros_like(drawn[:, :, :3]), where=weight > 0)
+    )
+    values[:, :, 3] = weights[:, :, 1]
+    is_opaque = values[:, :, 3].min(initial=1, where=weights[:, :, 3] > 0) >= _OPAQUE
+    layout.fill(values)
+    pixels = (np.clip(values[::-1, :, : 3 if is_opaque else 4], 0, 1) * 255 + 0.5).astype(np.uint8)
+    texture = Texture(pixels, extension="extend")
+    material = Material(
+        name,
+        texture,
+        alpha=None if is_opaque else Opacity(ImageAlpha(texture)),
+        how="baked",
+        uv=0 if layout.own else None,
+    )
     warning = f"material {name}: baked at {layout.side} x {layout.side}"
-    return Look(Material(name, texture, how="baked"), (Layer("uv", ""),), (warning,))
-
-
-def _bytes(values: NDArray[Any]) -> NDArray[np.uint8]:
-    """(H, W, C) values in [0, 1] as bytes, row 0 at the top."""
-    return np.ascontiguousarray((np.clip(values, 0, 1) * 255 + 0.5).astype(np.uint8)[::-1])
+    return Look(material, (Layer("uv", ""),), (warning,))
 
 
 def _layout(mesh: bpy.types.Mesh, vertices: Floats, matrix: Floats, rows: NDArray[np.int64], size: int) -> Layout:
@@ -228,11 +241,27 @@ def _triangles(source: bpy.types.Mesh, parts: list[_Part], temporary: ExitStack)
     mesh.attributes.default_color_name = source.attributes.default_color_name
     mesh.use_auto_texspace = False
     mesh.texspace_location, mesh.texspace_size = source.texspace_location, source.texspace_size
+    for _ in parts:
+        mesh.materials.append(None)
     target = mesh.attributes.new("FMQM bake", "FLOAT2", "CORNER")
     target.data.foreach_set("vector", np.concatenate([part.layout.drawn for part in parts]).ravel())
     name = target.name
     mesh.update(calc_edges=True)
     return mesh, name
+
+
+def _bend(object_: bpy.types.Object, at_rest: NDArray[np.float32], temporary: ExitStack) -> None:
+    """Has the mesh bent by a shape key from how it was modeled: Generated coordinates are those at rest."""
+    position = object_.data.attributes["position"]
+    bent = _values(position)
+    if np.array_equal(bent, at_rest):
+        return
+    position.data.foreach_set("vector", at_rest.ravel())
+    temporary.callback(object_.shape_key_clear)
+    object_.shape_key_add(name="At rest")
+    key = object_.shape_key_add(name="Bent")
+    key.data.foreach_set("co", bent.ravel())
+    key.value = 1
 
 
 def _store(mesh: bpy.types.Mesh, name: str, data_type: str, domain: str, values: NDArray[Any]) -> None:
@@ -254,11 +283,11 @@ def _loop_triangles(mesh: bpy.types.Mesh, what: str) -> NDArray[Any]:
 
 
 def _pixels(image: bpy.types.Image) -> NDArray[np.float32]:
-    """(H, W, 3) linear, row 0 at v = 0; what is not a number is 0."""
+    """(H, W, 4) linear, row 0 at v = 0; what is not a number is 0."""
     width, height = image.size
     values = np.empty(width * height * 4, np.float32)
     image.pixels.foreach_get(values)
-    return np.nan_to_num(values.reshape(height, width, 4)[:, :, :3])
+    return np.nan_to_num(values.reshape(height, width, 4))
 
 
 def _read(collection: Any, name: str, channels: int, dtype: type) -> NDArray[Any]:

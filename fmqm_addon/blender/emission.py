@@ -22,6 +22,17 @@ class Shine(Enum):
     WEIGHT = 2
 
 
+def is_opaque(tree: bpy.types.NodeTree) -> bool:
+    """Whether none of its nodes, its groups' among them, can make a material transparent."""
+    for node in tree.nodes:
+        alpha = node.inputs.get("Alpha") if any(socket.type == "SHADER" for socket in node.outputs) else None
+        if node.type in _TRANSPARENT or (alpha is not None and (alpha.is_linked or alpha.default_value < 1)):
+            return False
+        if node.type == "GROUP" and node.node_tree is not None and not is_opaque(node.node_tree):
+            return False
+    return True
+
+
 def shining(material: bpy.types.Material, shine: Shine, temporary: ExitStack) -> bpy.types.Material:
     """A copy of a material whose shaders, in its node groups too, are emissions; mixes of them stay.
 

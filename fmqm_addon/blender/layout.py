@@ -34,12 +34,14 @@ class Layout:
         drawn: (T, 3, 2) float32 those for the baker, larger by a hair.
         halves: (P, 4) column and row of the right angle's pixel, direction of the legs (1 or -1), their length in
             pixels: the triangles for which fill() completes what bilinear lookups read.
+        own: the corners are the mesh's own UV map.
     """
 
     side: int
     corners: NDArray[np.float32]
     drawn: NDArray[np.float32]
     halves: Ints
+    own: bool = False
 
     def fill(self, pixels: NDArray[Any]) -> None:
         """Completes a baked image, (side, side, C) with row 0 at v = 0.
@@ -73,7 +75,7 @@ def own_layout(uv: NDArray[np.float32], areas: Floats, side: int) -> Layout | No
         return None
     if _covered(uv, side).max() > 1:
         return None
-    return Layout(side, uv, uv, np.empty((0, 4), np.int64))
+    return Layout(side, uv, uv, np.empty((0, 4), np.int64), own=True)
 
 
 def new_layout(vertices: Floats, triangles: Ints, place: Ints, quad: Ints, side: int) -> Layout:
