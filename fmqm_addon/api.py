@@ -36,7 +36,8 @@ def measure(
     """Scores of objects or collections against a reference.
 
     Args:
-        reference, distorted: mesh objects, empties with meshes below them, collections; hidden or not.
+        reference, distorted: mesh, curve, surface, text or metaball objects, with their instances; empties, which
+            stand for all below them; collections. Hidden or not.
         settings: the paper's if None; `Settings(**PRESETS["fast"])` for a quick look.
         space: "auto", "world" or "local". match_scale: undo a factor between units.
         repeats: measure with so many seeds; scores become means.

@@ -33,9 +33,7 @@ def check_object(object_: bpy.types.Object) -> None:
         raise MeshError(f"{object_.name}: the object is of type {kind}; {WANTED}")
     mother = metaball_mother(object_) if object_.type == "META" else object_
     if mother != object_:
-        raise MeshError(
-            f"{object_.name}: its surface belongs to {mother.name}, the first of its metaballs; choose that"
-        )
+        raise MeshError(f"{object_.name}: the surface of these metaballs belongs to {mother.name}; choose that")
 
 
 def instanced(object_: bpy.types.Object) -> bpy.types.Collection | None:

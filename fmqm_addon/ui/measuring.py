@@ -30,7 +30,7 @@ def why_not(fmqm: FMQMScene) -> str:
     """Why there is nothing to measure yet, for the greyed-out button; "" if there is. Cheap: it runs at each redraw."""
     reference = reference_of(fmqm)
     if reference is None:
-        return "Choose a reference: the original mesh"
+        return "Choose a reference: the original"
     compared = [target for item in fmqm.compared if (target := item_target(item)) is not None]
     if not compared:
         return "Add an object to compare with the reference"

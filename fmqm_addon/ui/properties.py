@@ -11,17 +11,18 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
+from ..blender.assets import SURFACE_TYPES
 from ..blender.space import SPACES
 from ..metric.score import COLUMNS
 from ..metric.settings import FAST_SCORED_PATCHES, SETTING_NAMES, Settings
 
 SEED_LIMIT = 2**31 - 1  # of an IntProperty
 CUSTOM = "CUSTOM"
-ASSET_TYPES = ("MESH", "EMPTY")
+ASSET_TYPES = (*SURFACE_TYPES, "EMPTY")
 
 
 def is_asset(object_: bpy.types.Object) -> bool:
-    """Whether an object can be measured: a mesh, or an empty, which stands for the meshes below it."""
+    """Whether an object can be measured: one with a surface, or an empty, which stands for what hangs from it."""
     return object_.type in ASSET_TYPES
 
 
@@ -34,12 +35,12 @@ class FMQMItem(bpy.types.PropertyGroup):
 
     object: PointerProperty(
         name="Object",
-        description="Mesh, or empty whose meshes count as one object",
+        description="Mesh, curve, surface, text or metaball, or an empty, below which all counts as one object",
         type=bpy.types.Object,
         poll=_can_be_picked,
     )
     collection: PointerProperty(
-        name="Collection", description="Collection whose meshes count as one object", type=bpy.types.Collection
+        name="Collection", description="Collection whose objects count as one", type=bpy.types.Collection
     )
 
 

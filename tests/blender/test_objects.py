@@ -1,0 +1,383 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is measured: every kind of object that has a surface, its instances, and what renders show of files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix, Vector
+
+from fmqm_addon.blender.assets import check_object, metaball_mother, scene_members
+from fmqm_addon.blender.evaluate import evaluated
+from fmqm_addon.blender.files import load_mesh
+from fmqm_addon.blender.material import Reading
+from fmqm_addon.blender.mesh import mesh_arrays
+from fmqm_addon.blender.snapshot import fingerprint, take, target_of
+from fmqm_addon.metric.errors import MeshError
+from fmqm_addon.metric.surface import MeshArrays
+
+from . import scenes
+
+NO_BAKE = Reading(bake=0)
+
+
+def linked(object_: bpy.types.Object, collection: bpy.types.Collection | None = None) -> bpy.types.Object:
+    (collection or bpy.context.scene.collection).objects.link(object_)
+    return object_
+
+
+def collection(name: str, parent: bpy.types.Collection | None = None) -> bpy.types.Collection:
+    made = bpy.data.collections.new(name)
+    (parent or bpy.context.scene.collection).children.link(made)
+    return made
+
+
+def instancer(name: str, of: bpy.types.Collection, where: bpy.types.Collection | None = None) -> bpy.types.Object:
+    made = linked(bpy.data.objects.new(name, None), where)
+    made.instance_type, made.instance_collection = "COLLECTION", of
+    return made
+
+
+def library(name: str) -> bpy.types.Collection:
+    """A collection that only instances show."""
+    made = collection(name)
+    bpy.context.view_layer.layer_collection.children[name].exclude = True
+    return made
+
+
+def triangles(arrays: MeshArrays) -> np.ndarray:
+    """(T, 3, 3) positions, in an order of their own: for comparing sets of triangles."""
+    rows = np.round(arrays.positions[arrays.triangles].reshape(-1, 9), 4) + 0.0
+    return rows[np.lexsort(rows.T)]
+
+
+# Kinds of objects
+
+
+def added(operator: Callable[[], object], name: str) -> bpy.types.Object:
+    operator()
+    made = bpy.context.object
+    made.name = name
+    made.matrix_world = scenes.PLACED
+    return made
+
+
+def tube() -> bpy.types.Object:
+    made = added(bpy.ops.curve.primitive_bezier_circle_add, "Tube")
+    made.data.bevel_depth = 0.1
+    return made
+
+
+def text() -> bpy.types.Object:
+    made = added(bpy.ops.object.text_add, "Text")
+    made.data.extrude = 0.1
+    made.modifiers.new("Mirror", "MIRROR")
+    return made
+
+
+def patch() -> bpy.types.Object:
+    return added(bpy.ops.surface.primitive_nurbs_surface_sphere_add, "Patch")
+
+
+def balls() -> bpy.types.Object:
+    mother = added(bpy.ops.object.metaball_add, "Ball")
+    bpy.ops.object.metaball_add(location=(3, 2, 1))
+    bpy.context.object.name = "Ball.001"
+    mother.update_tag()  # Blender does not notice that a name makes them flow together
+    return mother
+
+
+KINDS = [tube, text, patch, balls]
+
+
+@pytest.mark.parametrize("hidden", [False, True], ids=["visible", "hidden"])
+@pytest.mark.parametrize("make", KINDS, ids=lambda make: make.__name__)
+def test_kinds_have_the_surface_that_blender_converts_them_to(
+    make: Callable[[], bpy.types.Object], hidden: bool
+) -> None:
+    object_ = make()
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    converted = bpy.data.objects.new("Converted", bpy.data.meshes.new_from_object(object_.evaluated_get(depsgraph)))
+    linked(converted).matrix_world = object_.matrix_world
+    wanted = mesh_arrays([converted], "asset")
+    object_.hide_viewport = hidden
+    before = scenes.blocks()
+    mine = take(target_of(object_)).world()
+    assert scenes.blocks() == before
+    assert len(mine.triangles) == len(wanted.triangles) > 100
+    np.testing.assert_allclose(triangles(mine), triangles(wanted), atol=2e-4)
+
+
+def test_metaballs_belong_to_their_mother() -> None:
+    mother = balls()
+    child = bpy.data.objects["Ball.001"]
+    assert metaball_mother(child) == mother
+    with pytest.raises(MeshError, match=r"^Ball\.001: .* belongs to Ball; choose that$"):
+        take(target_of(child))
+    assert scene_members() == [mother]
+
+
+def test_an_edited_metaball_is_noticed() -> None:
+    target = target_of(balls())
+    before = fingerprint(target, False)
+    bpy.data.objects["Ball"].data.elements[0].radius = 3.0
+    assert fingerprint(target, False) != before
+
+
+@pytest.mark.parametrize("kind", ["CAMERA", "ARMATURE", "LIGHT"])
+def test_other_kinds_are_refused(kind: str) -> None:
+    data = {
+        "CAMERA": lambda: bpy.data.cameras.new("Other"),
+        "ARMATURE": lambda: bpy.data.armatures.new("Other"),
+        "LIGHT": lambda: bpy.data.lights.new("Other", "POINT"),
+    }[kind]()
+    with pytest.raises(MeshError, match=f"^Other: the object is of type {kind.lower()}; a mesh, curve"):
+        check_object(linked(bpy.data.objects.new("Other", data)))
+
+
+def test_a_curve_without_a_surface() -> None:
+    with pytest.raises(MeshError, match="Line: the mesh has no faces"):
+        take(target_of(added(bpy.ops.curve.primitive_bezier_circle_add, "Line")))
+
+
+# Instances
+
+
+@pytest.mark.parametrize("hidden", [False, True], ids=["visible", "hidden"])
+def test_nested_collection_instances(hidden: bool) -> None:
+    inner, outer = library("Inner"), library("Outer")
+    scenes.square("Square", collection=inner).location.z = 0.5
+    linked(text(), inner)
+    inner.instance_offset = (0, 0, 0.25)
+    instancer("In", inner, outer).matrix_world = scenes.PLACED
+    scenes.cube("Cube", collection=outer)
+    top = instancer("Top", outer)
+    top.matrix_world = Matrix.LocRotScale((5, 6, 7), Matrix.Rotation(0.3, 3, "X"), (-1, 2, 1))
+    bpy.context.view_layer.update()
+    there = top.matrix_world @ scenes.PLACED @ Matrix.Translation((0, 0, -0.25))
+    square = np.array([there @ (vertex.co + Vector((0, 0, 0.5))) for vertex in bpy.data.meshes["Square"].vertices])
+    top.hide_viewport = hidden
+    before = scenes.blocks()
+    arrays = take(target_of(top)).world()
+    assert scenes.blocks() == before
+    letters = len(mesh_arrays([bpy.data.objects["Text"]], "asset").triangles)
+    assert len(arrays.triangles) == 2 + 12 + letters
+    distance = np.abs(arrays.positions[None] - square[:, None]).max(axis=2).min(axis=1)
+    assert distance.max() < 1e-5
+
+
+@pytest.mark.parametrize("hidden", [False, True], ids=["visible", "hidden"])
+@pytest.mark.parametrize(("kind", "count"), [("VERTS", 4), ("FACES", 1)])
+def test_children_on_vertices_and_faces(kind: str, count: int, hidden: bool) -> None:
+    parent, child = scenes.square("Parent"), scenes.cube("Child")
+    child.parent = parent
+    parent.instance_type = kind
+    parent.hide_viewport = hidden
+    assert len(mesh_arrays([parent], "asset").triangles) == 2 + 12 * count
+    parent.show_instancer_for_render = False
+    assert len(mesh_arrays([parent], "asset").triangles) == 12 * count
+
+
+def on_points(instance: bpy.types.Object) -> bpy.types.NodeTree:
+    """Geometry Nodes: the object's own surface, and on each vertex an instance of another and a blue cube."""
+    tree = bpy.data.node_groups.new("On Points", "GeometryNodeTree")
+    for direction in ("INPUT", "OUTPUT"):
+        tree.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
+    names = ("NodeGroupInput", "NodeGroupOutput", "GeometryNodeInstanceOnPoints", "GeometryNodeObjectInfo",
+             "GeometryNodeMeshCube", "GeometryNodeSetMaterial")  # fmt: skip
+    entry, end, points, info, box, paint = (tree.nodes.new(name) for name in names)
+    both, everything = (tree.nodes.new("GeometryNodeJoinGeometry") for _ in range(2))
+    info.inputs["Object"].default_value = instance
+    info.inputs["As Instance"].default_value = True
+    paint.inputs["Material"].default_value = scenes.material("Blue", (0, 0, 1))
+    for source, sink in (
+        (box.outputs["Mesh"], paint.inputs["Geometry"]),
+        (paint.outputs[0], both.inputs[0]),
+        (info.outputs["Geometry"], both.inputs[0]),
+        (both.outputs[0], points.inputs["Instance"]),
+        (entry.outputs[0], points.inputs["Points"]),
+        (entry.outputs[0], everything.inputs[0]),
+        (points.outputs[0], everything.inputs[0]),
+        (everything.outputs[0], end.inputs[0]),
+    ):
+        tree.links.new(source, sink)
+    return tree
+
+
+@pytest.mark.parametrize("hidden", [False, True], ids=["visible", "hidden"])
+def test_instances_of_geometry_nodes(hidden: bool) -> None:
+    red, source = scenes.material("Red", (1, 0, 0)), scenes.square("Source")
+    source.hide_render = True  # what instances show of it counts all the same
+    ground = scenes.square("Ground", materials=[red])
+    ground.modifiers.new("Nodes", "NODES").node_group = on_points(source)
+    ground.hide_viewport = hidden
+    arrays = mesh_arrays([ground], "asset")
+    assert len(arrays.triangles) == 2 + 4 * (2 + 12)
+    share = {look.name: np.count_nonzero(arrays.material == row) for row, look in enumerate(arrays.materials)}
+    assert share == {"Red": 2, "Blue": 4 * 12, "": 4 * 2}
+    assert [warning.partition(":")[0] for warning in arrays.warnings] == ["Source"]
+
+
+def test_many_instances_share_what_they_can() -> None:
+    shape = library("Shape")
+    scenes.square("Leaf", collection=shape, materials=[scenes.material("Green", (0, 1, 0))])
+    ground = collection("Ground")
+    for number in range(300):
+        instancer(f"Tree {number}", shape, ground).location.x = number
+    arrays = take(target_of(ground)).world()
+    assert len(arrays.triangles) == 600 and len(arrays.materials) == 1
+
+
+def test_particles_are_left_out_and_counted() -> None:
+    object_, leaf = scenes.square("Emitter"), scenes.cube("Leaf")
+    object_.modifiers.new("Particles", "PARTICLE_SYSTEM")
+    settings = object_.particle_systems[0].settings
+    settings.type, settings.count, settings.render_type, settings.instance_object = "HAIR", 7, "OBJECT", leaf
+    arrays = mesh_arrays([object_], "asset")
+    assert len(arrays.triangles) == 2
+    assert any(warning.startswith("Emitter: 7 particle instances are left out") for warning in arrays.warnings)
+
+
+def test_order_does_not_depend_on_the_files() -> None:
+    def build(order: list[str]) -> MeshArrays:
+        scenes.clear()
+        inner, outer = library("Inner"), library("Outer")
+        made = {name: scenes.square(name, collection=None) for name in "ABC"}
+        for name in order:
+            bpy.context.scene.collection.objects.unlink(made[name])
+            inner.objects.link(made[name])
+            made[name].location.x = 2 * ord(name)
+        for name in order:
+            instancer(f"I{name}", inner, outer).location.y = ord(name)
+        return take(target_of(instancer("Top", outer))).mesh
+
+    assert scenes.same(build(["A", "B", "C"]), build(["C", "A", "B"]))
+
+
+# Hidden from rendering
+
+
+def test_what_renders_hide_of_an_instanced_collection() -> None:
+    shape = library("Shape")
+    inner = collection("Off", shape)
+    inner.hide_render = True
+    scenes.square("Square", collection=shape)
+    scenes.cube("Cube", collection=inner)
+    scenes.cube("Hidden", collection=shape).hide_render = True
+    assert len(take(target_of(instancer("Top", shape))).mesh.triangles) == 2
+
+
+def test_what_renders_hide_of_a_collection() -> None:
+    top = collection("Top")
+    off, excluded = collection("Off", top), collection("Excluded", top)
+    off.hide_render = True
+    bpy.context.view_layer.layer_collection.children["Top"].children["Excluded"].exclude = True
+    scenes.square("Square", collection=top)
+    scenes.cube("Cube", collection=off)
+    scenes.cube("Other", collection=excluded)
+    assert len(take(target_of(top)).mesh.triangles) == 2
+    assert len(take(target_of(off)).mesh.triangles) == 12  # it is named
+    assert len(take(target_of(excluded)).mesh.triangles) == 12
+
+
+# Values at corners
+
+
+@pytest.mark.parametrize("kind", ["BYTE_COLOR", "FLOAT_COLOR"])
+@pytest.mark.parametrize("domain", ["POINT", "CORNER"])
+def test_colors_without_a_material(kind: str, domain: str) -> None:
+    """Scans have colors and no material; what is stored is linear light in either kind."""
+    object_ = scenes.square("Scan")
+    colors = object_.data.color_attributes.new("Color", kind, domain)
+    linear = np.random.default_rng(3).uniform(0, 1, (4, 4)).astype(np.float32)
+    for item, value in zip(colors.data, linear, strict=True):
+        item.color = value
+    arrays = mesh_arrays([object_], "asset")
+    stored = linear[arrays.triangles]  # the only face's corners run as its vertices
+    assert arrays.corners == pytest.approx(stored, abs=0.006 if kind == "BYTE_COLOR" else 1e-6)
+    assert not arrays.warnings and arrays.materials[0].how == "none"
+    center = np.array([[0.2, 0.3, 0.4, 1.0]])
+    encoded = 1.055 * center[0, :3] ** (1 / 2.4) - 0.055
+    assert arrays.materials[0].color.lookup(center)[0] == pytest.approx(encoded)
+
+
+def test_the_attribute_for_rendering_counts() -> None:
+    object_ = scenes.square("Scan")
+    for value in (0.25, 0.75):
+        colors = object_.data.color_attributes.new(f"{value}", "FLOAT_COLOR", "POINT")
+        colors.data.foreach_set("color", np.full(16, value, np.float32))
+    object_.data.color_attributes.render_color_index = 1
+    object_.data.color_attributes.active_color_index = 0
+    assert np.unique(mesh_arrays([object_], "asset").corners).tolist() == [0.75]
+
+
+def test_slots_have_layers_of_their_own_width() -> None:
+    """A slot with texture coordinates beside one with none: theirs are 0."""
+    looks = [scenes.material("Plain", (1, 0, 0)), scenes.material("Textured")]
+    scenes.image_node(looks[1], bpy.data.images.new("image", 2, 2))
+    object_ = scenes.cube(materials=looks)
+    object_.data.polygons.foreach_set("material_index", [0, 1, 0, 1, 0, 1])
+    arrays = mesh_arrays([object_], "asset")
+    assert arrays.corners.shape == (12, 3, 2)
+    plain = arrays.material == [look.name for look in arrays.materials].index("Plain")
+    assert np.count_nonzero(plain) == 6
+    assert not arrays.corners[plain].any() and arrays.corners[~plain].any(axis=(1, 2)).all()
+
+
+# Files
+
+
+def test_many_objects_without_material_say_so_once(tmp_path: Path) -> None:
+    for number in range(35):
+        scenes.cube(f"Part {number:02d}").location.x = 3 * number
+    path = scenes.export(tmp_path, "glb")
+    scenes.clear()
+    arrays = load_mesh(str(path))
+    assert len(arrays.triangles) == 35 * 12
+    assert arrays.warnings == ("Part 00, Part 01 and 33 more: there is no material; Blender's default grey is taken",)
+
+
+def rigged() -> bpy.types.Object:
+    """A cube on two bones of an armature."""
+    bpy.ops.object.armature_add(enter_editmode=True)
+    rig = bpy.context.object
+    bpy.ops.armature.extrude_move(TRANSFORM_OT_translate={"value": (0, 0, 1)})
+    bpy.ops.object.mode_set(mode="OBJECT")
+    skin = scenes.cube("Skin", materials=[scenes.material("Skin", (0.5, 0.4, 0.3))])
+    for bone in rig.data.bones:
+        skin.vertex_groups.new(name=bone.name).add(range(8), 0.5, "REPLACE")
+    skin.parent = rig
+    skin.modifiers.new("Armature", "ARMATURE").object = rig
+    return skin
+
+
+def test_bone_shapes_of_the_importer_are_not_the_asset(tmp_path: Path) -> None:
+    rigged()
+    path = scenes.export(tmp_path, "glb")
+    scenes.clear()
+    bpy.ops.import_scene.gltf(filepath=str(path), bone_heuristic="BLENDER", disable_bone_shape=False)
+    shapes = [bone.custom_shape for bone in bpy.data.objects["Armature"].pose.bones]
+    assert all(shape is not None for shape in shapes)  # there is something to leave out
+    shape = shapes[0]
+    if not shape.users_scene:
+        linked(shape)
+    shape.hide_render = False
+    name = shape.name
+    blend = scenes.export(tmp_path, "blend")
+    for file in (path, blend):
+        arrays = load_mesh(str(file))
+        assert len(arrays.triangles) == 12 and [look.name for look in arrays.materials] == ["Skin"]
+    assert len(load_mesh(f"{blend}:{name}").triangles) > 12  # it is named
+
+
+def test_evaluated_objects_keep_their_order() -> None:
+    """Those that the view layer leaves out are evaluated elsewhere."""
+    objects = [scenes.square(name) for name in "BCA"]
+    objects[1].hide_viewport = True
+    with evaluated(objects) as found:
+        assert [each.original for each in found] == objects
+        assert found[1].object.original != objects[1] and found[0].object.original == objects[0]
