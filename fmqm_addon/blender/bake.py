@@ -18,7 +18,7 @@ from ..metric.spatial import Floats
 from ..metric.surface import triangle_areas
 from .emission import Shine, is_opaque, shining
 from .layout import Layout, new_layout, own_layout
-from .material import Layer, Look
+from .material import Layer, Look, Unread
 
 _MARGIN = 8  # pixels around the parts of an own UV map, for bilinear lookups at their edges
 _OPAQUE = 254.5 / 255  # what rounds to 255
@@ -60,7 +60,7 @@ class _Part:
 def bake_slots(
     object_: bpy.types.Object,
     depsgraph: bpy.types.Depsgraph,
-    slots: Mapping[int, bpy.types.Material],
+    slots: Mapping[int, tuple[bpy.types.Material, Unread]],
     size: int,
     owner: str,
 ) -> dict[int, Baked]:
@@ -68,26 +68,25 @@ def bake_slots(
 
     Args:
         object_: evaluated; its mesh is the one that to_mesh(preserve_all_data_layers=True, depsgraph) gives.
-        slots: by Polygon.material_index; slots without faces have no result.
+        slots: what to bake and why, by Polygon.material_index; slots without faces have no result.
         size: side of the images in pixels; becomes a power of two, and larger if the faces need it.
         owner: what messages call the object.
 
     Raises:
         MeshError: this Blender has no Cycles, or it fails, or there are too many faces.
     """
-    names = ", ".join(dict.fromkeys(material.name for material in slots.values()))
     try:
         with ExitStack() as temporary:
             return _bake(object_, depsgraph, slots, size, temporary)
     except (MeshError, RuntimeError, TypeError) as error:
         why = (str(error).strip() or type(error).__name__).splitlines()[-1].removeprefix("Error: ")
-        raise MeshError(f"{owner}: material {names} cannot be baked ({why}); bake 0 takes its plain color") from error
+        raise MeshError(f"baking {owner} failed: {why}") from error
 
 
 def _bake(
     object_: bpy.types.Object,
     depsgraph: bpy.types.Depsgraph,
-    slots: Mapping[int, bpy.types.Material],
+    slots: Mapping[int, tuple[bpy.types.Material, Unread]],
     size: int,
     temporary: ExitStack,
 ) -> dict[int, Baked]:
@@ -110,16 +109,19 @@ def _bake(
     mesh, uv_map = _triangles(source, parts, temporary)
     stand_in = bpy.data.objects.new("FMQM bake", mesh)
     temporary.callback(bpy.data.objects.remove, stand_in)
-    stand_in.matrix_world = object_.matrix_world
+    # An object's own location, rotation and scale cannot hold a shear; the inverse of a parent's can.
+    stand_in.parent = bpy.data.objects.new("FMQM bake", None)
+    temporary.callback(bpy.data.objects.remove, stand_in.parent)
+    stand_in.matrix_parent_inverse = object_.matrix_world
     stand_in.color, stand_in.pass_index = object_.color, object_.pass_index
     scene.collection.objects.link(stand_in)
     modeled = object_.original.data
     if isinstance(modeled, bpy.types.Mesh) and len(modeled.vertices) == len(mesh.vertices):
-        _bend(stand_in, _values(modeled.attributes["position"]), temporary)
+        _bend(stand_in, _read(modeled.vertices, "co", 3, np.float32), temporary)
 
     def draw(shine: Shine) -> list[NDArray[np.float32]]:
         for index, part in enumerate(parts):
-            material = shining(slots[part.slot].original, shine, temporary)
+            material = shining(slots[part.slot][0].original, shine, temporary)
             target = material.node_tree.nodes.new("ShaderNodeTexImage")
             target.image = part.image
             material.node_tree.nodes.active = target
@@ -128,10 +130,10 @@ def _bake(
         return [_pixels(part.image) for part in parts]
 
     colors = draw(Shine.COLOR)
-    opaque = all(is_opaque(slots[part.slot].node_tree) for part in parts)
+    opaque = all(is_opaque(slots[part.slot][0].node_tree) for part in parts)
     weights = [np.ones_like(color) for color in colors] if opaque else draw(Shine.WEIGHT)
     return {
-        part.slot: Baked(_look(slots[part.slot].name, part.layout, color, weight), part.layout.corners)
+        part.slot: Baked(_look(*slots[part.slot], part.layout, color, weight), part.layout.corners)
         for part, color, weight in zip(parts, colors, weights, strict=True)
     }
 
@@ -171,7 +173,13 @@ def _run(scene: bpy.types.Scene, object_: bpy.types.Object, uv_map: str) -> None
         raise MeshError("Cycles did not finish")
 
 
-def _look(name: str, layout: Layout, drawn: NDArray[np.float32], weights: NDArray[np.float32]) -> Look:
+def _look(
+    material: bpy.types.Material,
+    unread: Unread,
+    layout: Layout,
+    drawn: NDArray[np.float32],
+    weights: NDArray[np.float32],
+) -> Look:
     """Divides the transparent out, and encodes.
 
     Args:
@@ -183,19 +191,20 @@ def _look(name: str, layout: Layout, drawn: NDArray[np.float32], weights: NDArra
         np.divide(drawn[:, :, :3], weight, out=np.zeros_like(drawn[:, :, :3]), where=weight > 0)
     )
     values[:, :, 3] = weights[:, :, 1]
-    is_opaque = values[:, :, 3].min(initial=1, where=weights[:, :, 3] > 0) >= _OPAQUE
+    opaque = values[:, :, 3].min(initial=1, where=weights[:, :, 3] > 0) >= _OPAQUE
     layout.fill(values)
-    pixels = (np.clip(values[::-1, :, : 3 if is_opaque else 4], 0, 1) * 255 + 0.5).astype(np.uint8)
+    pixels = (np.clip(values[::-1, :, : 3 if opaque else 4], 0, 1) * 255 + 0.5).astype(np.uint8)
     texture = Texture(pixels, extension="extend")
-    material = Material(
-        name,
+    made = Material(
+        material.name,
         texture,
-        alpha=None if is_opaque else Opacity(ImageAlpha(texture)),
+        alpha=None if opaque else Opacity(ImageAlpha(texture)),
         how="baked",
+        images=unread.images,
         uv=0 if layout.own else None,
     )
-    warning = f"material {name}: baked at {layout.side} x {layout.side}"
-    return Look(material, (Layer("uv", ""),), (warning,))
+    warning = f"material {material.name}: {unread.node} {unread.why}; baked at {layout.side} x {layout.side}"
+    return Look(made, (Layer("uv", ""),), (warning,))
 
 
 def _layout(mesh: bpy.types.Mesh, vertices: Floats, matrix: Floats, rows: NDArray[np.int64], size: int) -> Layout:

@@ -104,6 +104,8 @@ def _replace(tree: bpy.types.NodeTree, node: bpy.types.Node, output: bpy.types.N
         wanted = node.inputs.get("Base Color") or node.inputs.get("Color")
         if node.type not in _TRANSPARENT and wanted is not None:
             _take_over(tree, wanted, color)
+        if "Alpha" in node.inputs and node.inputs["Alpha"].is_linked:
+            _keep_in_use(tree, node.inputs["Alpha"].links[0].from_socket, color.node.inputs["Strength"])
     elif node.type not in _TRANSPARENT:
         weights = tree.nodes.new("ShaderNodeCombineColor")
         tree.links.new(weights.outputs[0], color)
@@ -111,6 +113,15 @@ def _replace(tree: bpy.types.NodeTree, node: bpy.types.Node, output: bpy.types.N
         if "Alpha" in node.inputs:
             _take_over(tree, node.inputs["Alpha"], weights.inputs["Green"])
     tree.nodes.remove(node)
+
+
+def _keep_in_use(tree: bpy.types.NodeTree, alpha: bpy.types.NodeSocket, strength: bpy.types.NodeSocket) -> None:
+    """Cycles divides an image's color by its alpha only where the alpha is used too."""
+    one = tree.nodes.new("ShaderNodeMath")
+    one.operation = "MULTIPLY_ADD"
+    one.inputs[1].default_value, one.inputs[2].default_value = 1e-7, 1
+    tree.links.new(alpha, one.inputs[0])
+    tree.links.new(one.outputs[0], strength)
 
 
 def _emission(

@@ -124,10 +124,11 @@ class Look:
 
 @dataclass(frozen=True)
 class Unread:
-    """A material that must be baked: the node that is not read, and what about it."""
+    """A material that must be baked: the node that is not read, what about it, and the images that are used."""
 
     node: str
     why: str
+    images: tuple[ImageFacts, ...] = ()
 
 
 def read_look(material: bpy.types.Material | None, cache: TextureCache, reading: Reading) -> Look | Unread:
@@ -158,7 +159,7 @@ def _read_look(material: bpy.types.Material | None, cache: TextureCache, reading
     try:
         color, alpha = reader.look()
     except _NotReadError as error:
-        return Unread(error.node, error.why)
+        return Unread(error.node, error.why, used_images(material, cache))
     uv = next((reader.channel(layer) for layer in reader.layers if layer.kind == "uv"), None)
     made = Material(material.name, color, alpha, "read", used_images(material, cache), uv)
     return Look(made, tuple(reader.layers), tuple(reader.warnings))

@@ -263,11 +263,16 @@ def _as_arrays(shape: _Shape, reading: Reading) -> MeshArrays:
 
 def _resolved(shape: _Shape, reading: Reading) -> dict[int, tuple[Look, NDArray[np.float32]]]:
     """Look and corner values of each slot; what could not be read is baked."""
-    unread = {index: slot.material for index, slot in shape.slots.items() if isinstance(slot.look, Unread)}
+    unread = {index: (slot.material, slot.look) for index, slot in shape.slots.items() if isinstance(slot.look, Unread)}
     baked: dict[int, Baked] = {}
+    why = "baking is off"
     if unread and reading.bake:
+        why = "a mesh that only instances have is not baked"
         source = shape.source.evaluated_get(shape.depsgraph)
-        baked = bake_slots(source, shape.depsgraph, unread, reading.bake, shape.name)
+        try:
+            baked = bake_slots(source, shape.depsgraph, unread, reading.bake, shape.name)
+        except MeshError as error:
+            why = str(error)
     found = {}
     for index, slot in shape.slots.items():
         if isinstance(slot.look, Look):
@@ -275,14 +280,13 @@ def _resolved(shape: _Shape, reading: Reading) -> dict[int, tuple[Look, NDArray[
         elif index in baked and len(baked[index].corners) == len(slot.corners):
             found[index] = (baked[index].look, baked[index].corners)
         else:  # a mesh that only instances have is no object's to bake
-            found[index] = (_plain_look(slot.material, slot.look, reading), slot.corners)
+            found[index] = (_plain_look(slot.material, slot.look, why), slot.corners)
     return found
 
 
-def _plain_look(material: bpy.types.Material, unread: Unread, reading: Reading) -> Look:
-    why = "a mesh that only instances have is not baked" if reading.bake else "baking is off"
+def _plain_look(material: bpy.types.Material, unread: Unread, why: str) -> Look:
     return plain_look(
-        material, f"material {material.name}: {unread.node}: {unread.why}, and {why}; its plain color is taken"
+        material, f"material {material.name}: {unread.node} {unread.why}, and {why}; its plain color is taken"
     )
 
 
