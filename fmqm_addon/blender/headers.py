@@ -22,11 +22,12 @@ DEFAULT_LIMITS = Limits()
 
 @dataclass(frozen=True)
 class Header:
-    """Width and height in pixels, and whether Blender decodes the file to floats."""
+    """Width and height in pixels, whether Blender decodes the file to floats, and whether it is a two-channel PNG."""
 
     width: int
     height: int
     is_float: bool = False
+    is_grey_with_alpha: bool = False
 
     @property
     def decoded(self) -> int:
@@ -68,8 +69,8 @@ def _unpack(layout: str, file: BinaryIO, at: int | None = None) -> tuple[int, ..
 
 
 def _png(file: BinaryIO) -> Header:
-    width, height, depth = _unpack(">IIB", file, 16)
-    return Header(width, height, depth == 16)
+    width, height, depth, kind = _unpack(">IIBB", file, 16)
+    return Header(width, height, depth == 16, kind == 4)
 
 
 def _jpeg(file: BinaryIO) -> Header | None:

@@ -15,12 +15,13 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..metric.color import ImageFacts, Texture
+from ..metric.color import ImageFacts, Texture, encode_srgb
 from ..metric.errors import FileError, MeshError
 from .headers import DEFAULT_LIMITS, Header, Limits, file_header, read_header
 
 LINEAR_SPACES = frozenset({"Non-Color", "Linear Rec.709", "scene_linear"})
 BRIGHTEST = 1e6  # linear light in float images is kept within this, so that nothing made of it overflows
+_LIGHT_FORMATS = frozenset({"OPEN_EXR", "OPEN_EXR_MULTILAYER", "HDR", "DPX", "CINEON"})  # hold linear light
 _BLOCK = 2**24  # floats that are converted at a time
 
 
@@ -32,11 +33,14 @@ class Pixels:
         values: (H, W, 3 or 4) uint8, or float32 within BRIGHTEST; row 0 at the top; a fourth channel is alpha.
         linear: the values are linear light, not encoded for display.
         associated: the colors are multiplied by alpha.
+        unusual: the colors are not what Cycles samples: how it treats alpha depends here on how the file came to
+            Blender, and on Blender's version.
     """
 
     values: NDArray[np.uint8] | NDArray[np.float32]
     linear: bool
     associated: bool
+    unusual: bool
 
 
 class TextureCache:
@@ -98,29 +102,51 @@ def _float_pixels(image: bpy.types.Image, values: NDArray[np.float32]) -> Pixels
     np.clip(values, -BRIGHTEST, BRIGHTEST, out=values)
     if values.shape[2] < 3:
         values = np.repeat(values[:, :, :1], 3, axis=2)
+    has_alpha = _has_alpha(image, values)
     if values.shape[2] == 4:
-        if image.alpha_mode == "NONE":
-            values[:, :, 3] = 1
-        np.clip(values[:, :, 3], 0, 1, out=values[:, :, 3])
-    return Pixels(values, linear=True, associated=_associates(image))
+        values[:, :, 3] = np.clip(values[:, :, 3], 0, 1) if has_alpha else 1
+    associated = has_alpha and _associates(image)
+    is_light = image.file_format in _LIGHT_FORMATS
+    # Of files, Cycles samples 16-bit integers as they are encoded; of what Blender holds, as linear light.
+    encoded = image.source == "FILE" and not (image.packed_file or image.is_dirty or is_light or is_linear(image))
+    usual = is_light if image.alpha_mode == "PREMUL" else encoded
+    if encoded:
+        for row in values:
+            alpha = np.where(row[:, 3:] > 0, row[:, 3:], 1) if associated else 1
+            row[:, :3] = encode_srgb(row[:, :3] / alpha) * alpha
+    return Pixels(values, linear=not encoded, associated=associated, unusual=associated and not usual)
 
 
 def _byte_pixels(image: bpy.types.Image, values: NDArray[np.float32]) -> Pixels:
     """The values are the file's bytes / 255; kept are those, at a quarter of the size."""
     height, width, depth = values.shape
-    step = max(1, _BLOCK // (width * depth))
-    blocks = [slice(first, first + step) for first in range(0, height, step)]
-    has_alpha = depth == 4 and image.alpha_mode != "NONE" and any(values[rows, :, 3].min() < 1 for rows in blocks)
-    associates = has_alpha and _associates(image)
+    has_alpha = _has_alpha(image, values)
+    associated = has_alpha and _associates(image)
     result: NDArray[np.uint8] = np.empty((height, width, 4 if has_alpha else 3), np.uint8)
     upwards = result[::-1]
-    for rows in blocks:
+    for rows in _row_blocks(values):
         block = (values[rows] * 255 + 0.5).astype(np.uint8)
         upwards[rows] = block[:, :, : result.shape[2]] if depth >= 3 else block[:, :, :1]
-        if associates:  # rounded down, as Cycles does
+        if associated:  # rounded down, as Cycles does
             color = upwards[rows, :, :3]
             color[...] = color.astype(np.uint16) * block[:, :, 3:] // 255
-    return Pixels(result, linear=is_linear(image), associated=associates)
+    grey = associated and not image.packed_file and _is_grey_with_alpha(image)
+    unusual = associated and (image.alpha_mode == "PREMUL" or grey)
+    return Pixels(result, linear=is_linear(image), associated=associated, unusual=unusual)
+
+
+def _has_alpha(image: bpy.types.Image, values: NDArray[np.float32]) -> bool:
+    """Whether an image's alpha counts and is somewhere below 1."""
+    if values.shape[2] < 4 or image.alpha_mode == "NONE":
+        return False
+    return any(values[rows, :, 3].min() < 1 for rows in _row_blocks(values))
+
+
+def _row_blocks(values: NDArray[Any]) -> list[slice]:
+    """The rows of an image in blocks that are small beside it, where it is large."""
+    height, width, depth = values.shape
+    step = max(1, _BLOCK // (width * depth))
+    return [slice(first, first + step) for first in range(0, height, step)]
 
 
 def is_linear(image: bpy.types.Image) -> bool:
@@ -129,8 +155,13 @@ def is_linear(image: bpy.types.Image) -> bool:
 
 
 def _associates(image: bpy.types.Image) -> bool:
-    """Whether Cycles multiplies the colors of an image by its alpha before it samples them."""
+    """Whether Cycles wants the colors of an image multiplied by its alpha."""
     return not image.colorspace_settings.is_data and image.alpha_mode in {"STRAIGHT", "PREMUL"}
+
+
+def _is_grey_with_alpha(image: bpy.types.Image) -> bool:
+    header = image_header(image)
+    return header is not None and header.is_grey_with_alpha
 
 
 def read_tile(image: bpy.types.Image, number: int, limits: Limits = DEFAULT_LIMITS) -> Pixels | None:

@@ -536,6 +536,8 @@ class _Reader:
     def _sampler(self, node: bpy.types.Node, pixels: Pixels, placement: Placement) -> Texture:
         if pixels.values.dtype == np.uint8 and node.image.colorspace_settings.name not in LINEAR_SPACES | {"sRGB"}:
             raise _NotReadError(node, f"has an image in the color space {node.image.colorspace_settings.name}")
+        if pixels.unusual:
+            raise _NotReadError(node, "has an image that stores its alpha in an unusual way")
         return Texture(
             pixels.values,
             extension=_EXTENSIONS[node.extension],
