@@ -17,10 +17,11 @@ from ..metric.errors import MeshError
 from ..metric.spatial import Floats
 from ..metric.surface import triangle_areas
 from .emission import Shine, is_opaque, shining
-from .layout import Layout, new_layout, own_layout
+from .layout import LARGEST, Layout, new_layout, own_layout
 from .material import Layer, Look, Unread
 
 _MARGIN = 8  # pixels around the parts of an own UV map, for bilinear lookups at their edges
+_ROWS = 256  # of an image that are worked on at a time
 _OPAQUE = 254.5 / 255  # what rounds to 255
 _VALUES = {  # how the values of an attribute are called, and their number, by data type
     "FLOAT": ("value", 1, np.float32),
@@ -131,7 +132,7 @@ def _bake(
 
     colors = draw(Shine.COLOR)
     opaque = all(is_opaque(slots[part.slot][0].node_tree) for part in parts)
-    weights = [np.ones_like(color) for color in colors] if opaque else draw(Shine.WEIGHT)
+    weights = [None] * len(parts) if opaque else draw(Shine.WEIGHT)
     return {
         part.slot: Baked(_look(*slots[part.slot], part.layout, color, weight), part.layout.corners)
         for part, color, weight in zip(parts, colors, weights, strict=True)
@@ -177,23 +178,21 @@ def _look(
     material: bpy.types.Material,
     unread: Unread,
     layout: Layout,
-    drawn: NDArray[np.float32],
-    weights: NDArray[np.float32],
+    colors: NDArray[np.float32],
+    weights: NDArray[np.float32] | None,
 ) -> Look:
-    """Divides the transparent out, and encodes.
+    """The drawn images as samplers.
 
     Args:
-        drawn, weights: (H, W, 4), row 0 at v = 0, the fourth 0 where nothing was drawn; see emission.Shine.
+        colors, weights: (H, W, 4), row 0 at v = 0, see _pixels and Shine; colors is overwritten. None: 1 everywhere.
     """
-    weight = np.minimum(weights[:, :, :1], 1)  # more than 1 where shaders are added
-    values = np.empty_like(drawn)
-    values[:, :, :3] = encode_srgb(
-        np.divide(drawn[:, :, :3], weight, out=np.zeros_like(drawn[:, :, :3]), where=weight > 0)
-    )
-    values[:, :, 3] = weights[:, :, 1]
-    opaque = values[:, :, 3].min(initial=1, where=weights[:, :, 3] > 0) >= _OPAQUE
-    layout.fill(values)
-    pixels = (np.clip(values[::-1, :, : 3 if opaque else 4], 0, 1) * 255 + 0.5).astype(np.uint8)
+    opaque = weights is None or weights[:, :, 1].min(initial=1, where=weights[:, :, 3] > 0) >= _OPAQUE
+    for rows in (slice(first, first + _ROWS) for first in range(0, layout.side, _ROWS)):
+        _encode(colors[rows], None if weights is None else weights[rows])
+    layout.fill(colors)
+    pixels = np.empty((layout.side, layout.side, 3 if opaque else 4), np.uint8)
+    for rows in (slice(first, first + _ROWS) for first in range(0, layout.side, _ROWS)):
+        pixels[::-1][rows] = np.clip(colors[rows, :, : pixels.shape[2]], 0, 1) * 255 + 0.5
     texture = Texture(pixels, extension="extend")
     made = Material(
         material.name,
@@ -207,6 +206,16 @@ def _look(
     return Look(made, (Layer("uv", ""),), (warning,))
 
 
+def _encode(colors: NDArray[np.float32], weights: NDArray[np.float32] | None) -> None:
+    """Divides what is transparent out and encodes for display, in place; the fourth channel becomes the opacity."""
+    light = colors[:, :, :3]
+    if weights is not None:
+        weight = np.minimum(weights[:, :, :1], 1)  # more than 1 where shaders are added
+        np.divide(light, weight, out=light, where=weight > 0)
+        colors[:, :, 3] = weights[:, :, 1]
+    colors[:, :, :3] = encode_srgb(light)
+
+
 def _layout(mesh: bpy.types.Mesh, vertices: Floats, matrix: Floats, rows: NDArray[np.int64], size: int) -> Layout:
     """Places of the triangles in rows of loop_triangles."""
     world = vertices @ matrix[:3, :3].T
@@ -214,7 +223,7 @@ def _layout(mesh: bpy.types.Mesh, vertices: Floats, matrix: Floats, rows: NDArra
     active = next((layer for layer in mesh.uv_layers if layer.active_render), None)
     if active is not None:
         uv = _values(mesh.attributes[active.name])[loops]
-        own = own_layout(uv, triangle_areas(world, triangles), size)
+        own = own_layout(uv, triangle_areas(world, triangles), min(size, LARGEST))
         if own is not None:
             return own
     polygon = _polygons(mesh)[rows]
@@ -292,11 +301,11 @@ def _loop_triangles(mesh: bpy.types.Mesh, what: str) -> NDArray[Any]:
 
 
 def _pixels(image: bpy.types.Image) -> NDArray[np.float32]:
-    """(H, W, 4) linear, row 0 at v = 0; what is not a number is 0."""
+    """(H, W, 4) linear, row 0 at v = 0, the fourth 0 where nothing was drawn; what is not a number is 0."""
     width, height = image.size
     values = np.empty(width * height * 4, np.float32)
     image.pixels.foreach_get(values)
-    return np.nan_to_num(values.reshape(height, width, 4))
+    return np.nan_to_num(values, copy=False).reshape(height, width, 4)
 
 
 def _read(collection: Any, name: str, channels: int, dtype: type) -> NDArray[Any]:

@@ -136,9 +136,9 @@ def grid_map(count: int, low: float = 0.0, high: float = 1.0) -> np.ndarray:
     return pairs.reshape(-1, 3, 2).astype(np.float32)
 
 
-@pytest.mark.parametrize("count", [1, 3, 8, 50])
-def test_own_map_that_serves(count: int) -> None:
-    uv = grid_map(count)
+@pytest.mark.parametrize(("count", "high"), [(1, 1.0), (3, 1.0), (8, 1.000001), (50, 0.6)])
+def test_own_map_that_serves(count: int, high: float) -> None:
+    uv = grid_map(count, 0.0, high)
     found = own_layout(uv, np.ones(len(uv)), 128)
     assert found is not None and found.own and np.array_equal(found.corners, uv)
 
