@@ -13,16 +13,16 @@ from mathutils import Matrix, Vector
 
 from fmqm_addon.blender.assets import check_object, metaball_mother, scene_members
 from fmqm_addon.blender.evaluate import evaluated
-from fmqm_addon.blender.files import load_mesh
-from fmqm_addon.blender.material import Reading
+from fmqm_addon.blender.files import load_mesh, load_placed
+from fmqm_addon.blender.measure import Measurement
 from fmqm_addon.blender.mesh import mesh_arrays
 from fmqm_addon.blender.snapshot import fingerprint, take, target_of
+from fmqm_addon.blender.space import place
 from fmqm_addon.metric.errors import MeshError
+from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.surface import MeshArrays
 
 from . import scenes
-
-NO_BAKE = Reading(bake=0)
 
 
 def linked(object_: bpy.types.Object, collection: bpy.types.Collection | None = None) -> bpy.types.Object:
@@ -339,6 +339,35 @@ def test_many_objects_without_material_say_so_once(tmp_path: Path) -> None:
     arrays = load_mesh(str(path))
     assert len(arrays.triangles) == 35 * 12
     assert arrays.warnings == ("Part 00, Part 01 and 33 more: there is no material; Blender's default grey is taken",)
+
+
+UP = {
+    "obj": lambda path: bpy.ops.wm.obj_export(filepath=path),  # importers turn it back
+    "glb": lambda path: bpy.ops.export_scene.gltf(filepath=path, export_format="GLB"),
+    "ply": lambda path: bpy.ops.wm.ply_export(filepath=path, up_axis="Y", forward_axis="NEGATIVE_Z"),  # not these
+    "stl": lambda path: bpy.ops.wm.stl_export(filepath=path, up_axis="Y", forward_axis="NEGATIVE_Z"),
+}
+
+
+def test_kinds_of_files_whose_axes_differ(tmp_path: Path) -> None:
+    """As scanned models come: Y is up in all the files, and importers of OBJ and glTF turn that."""
+    monkey = scenes.monkey(materials=[scenes.material("Grey", (0.8, 0.8, 0.8))])
+    monkey.matrix_world = Matrix.Diagonal((1, 2, 1.5, 1))
+    monkey.modifiers.new("Triangulate", "TRIANGULATE")
+    bpy.ops.object.modifier_apply(modifier="Triangulate")
+    for kind, write in UP.items():
+        write(str(tmp_path / f"monkey.{kind}"))
+    turns = {}
+    for kind in UP:
+        reference = load_placed(str(tmp_path / f"monkey.{kind}"))
+        measurement = Measurement(reference.world(), Settings(samples=4000, patches=40))
+        measurement.prepare().run()
+        for other in UP:
+            placement = place(reference, load_placed(str(tmp_path / f"monkey.{other}")))
+            assert measurement.compare(placement.mesh).run().scores[0] >= 0.999, (kind, other)
+            turns[kind, other] = placement.turn
+    assert turns["glb", "ply"] == 90 and turns["stl", "glb"] == -90
+    assert turns["ply", "stl"] == turns["obj", "glb"] == 0
 
 
 def rigged() -> bpy.types.Object:
