@@ -23,10 +23,12 @@ from fmqm_addon.metric.errors import FMQMError, SettingsError
 from fmqm_addon.metric.settings import CENTERS, COLOR_SPACES, POOLINGS, PRESETS, SETTING_NAMES, Settings
 
 if TYPE_CHECKING:
+    from fmqm_addon.blender.material import Reading
     from fmqm_addon.blender.measure import Comparison, Measurement
     from fmqm_addon.blender.space import Placed
     from fmqm_addon.metric.score import Stepper
 
+MAX_BAKE = 16384  # pixels a side
 OK, FAILED, WRONG_ARGUMENTS, INTERRUPTED = 0, 1, 2, 130
 T = TypeVar("T")
 
@@ -93,6 +95,21 @@ def build_parser() -> OneLineParser:
         "--match-scale", action="store_true", help="undo a difference in size by a factor between units (100, 2.54)"
     )
 
+    settings.add_argument(
+        "--both", action="store_true", help="score the other direction too, which sees what only the distorted has"
+    )
+
+    reading = parser.add_argument_group("reading")
+    reading.add_argument(
+        "--bake", type=int, metavar="N",
+        help="side of baked images (default: 1024), and a missing base-color image counts as Blender shows it, "
+        "magenta; 0: nothing is baked, plain colors are taken",
+    )  # fmt: skip
+    reading.add_argument("--max-image-side", type=int, metavar="N", help="largest side of an image (default: 32768)")
+    reading.add_argument(
+        "--max-image-bytes", type=int, metavar="N", help="largest size of a decoded image (default: 1 GiB)"
+    )
+
     output = parser.add_argument_group("output")
     output.add_argument(
         "--json", metavar="FILE", help="everything as JSON; - is stdout, which then carries nothing else"
@@ -101,6 +118,7 @@ def build_parser() -> OneLineParser:
     output.add_argument("--save-fields", metavar="FILE.npz", help="samples, fields and patch scores of the one pair")
     output.add_argument("--picture", metavar="FILE.png", help="reference, distorted and heat map of the one pair")
     output.add_argument("--fail-under", type=float, metavar="X", help="exit code 1 if an FMQM is below X")
+    output.add_argument("--verbose", action="store_true", help="how far to trust each score: the facts, in a table")
     output.add_argument("--quiet", action="store_true", help="no progress on stderr")
     return parser
 
@@ -129,6 +147,12 @@ def main(argv: Sequence[str], out: TextIO) -> int:
 def _check_arguments(args: argparse.Namespace) -> None:
     if args.repeats < 1:
         raise SettingsError(f"repeats is {args.repeats}; it must be at least 1")
+    if args.bake is not None and not 0 <= args.bake <= MAX_BAKE:
+        raise SettingsError(f"bake is {args.bake}; it must be between 0 and {MAX_BAKE}")
+    for flag in ("max_image_side", "max_image_bytes"):
+        limit = getattr(args, flag)
+        if limit is not None and limit < 1:
+            raise SettingsError(f"{flag.replace('_', '-')} is {limit}; it must be at least 1")
     if args.fail_under is not None and not 0 <= args.fail_under <= 1:
         raise SettingsError(f"fail-under is {args.fail_under}; it must be between 0 and 1")
     if len(args.texture) not in (0, 1, len(args.distorted)):
@@ -153,7 +177,7 @@ def _score(args: argparse.Namespace, settings: Settings, out: TextIO) -> int:
     from fmqm_addon import VERSION
     from fmqm_addon.report.fields import save_fields
     from fmqm_addon.report.files import check_writable, write_text
-    from fmqm_addon.report.pair import csv_text, json_text, table_text
+    from fmqm_addon.report.pair import csv_text, json_text, table_text, trust_tables
     from fmqm_addon.report.picture import write_picture
 
     for path in (args.json, args.csv, args.save_fields, args.picture):
@@ -170,6 +194,8 @@ def _score(args: argparse.Namespace, settings: Settings, out: TextIO) -> int:
         out.write(json_document)
     else:
         out.write(table_text(run.pairs))
+        if args.verbose:
+            out.write(trust_tables(run.pairs))
         if args.json:
             write_text(args.json, json_document)
     if args.csv:
@@ -205,7 +231,9 @@ class Run:
     def score(self) -> None:
         from fmqm_addon.blender.measure import Measurement
         from fmqm_addon.blender.space import place
+        from fmqm_addon.blender.trust import known_facts
         from fmqm_addon.report.pair import PairScore
+        from fmqm_addon.report.trust import trust_dict
 
         args = self.args
         began = time.perf_counter()
@@ -214,8 +242,9 @@ class Run:
         try:
             self._progress.show(0, f"loading {args.reference}")
             reference = _timed(seconds, lambda: self._load(args.reference, args.ref_texture))
+            self._tell_memory(reference)
             self.measurement = Measurement(reference.world(), self.settings, args.repeats)
-            self._work(self.measurement.prepare(), 0, "preparing the reference", seconds)
+            self._work(self.measurement.prepare(), 0, 1, "preparing the reference", seconds)
         except FMQMError as reason:
             error = reason
         textures = args.texture * len(args.distorted) if len(args.texture) == 1 else args.texture
@@ -228,7 +257,13 @@ class Run:
                 texture = textures[index] if textures else None
                 loaded = _timed(seconds, lambda name=name, texture=texture: self._load(name, texture))  # type: ignore[misc]
                 placement = place(reference, loaded, args.space, args.match_scale)
-                compared = self._work(self.measurement.compare(placement.mesh), index + 1, f"scoring {name}", seconds)
+                comparing = self.measurement.compare(placement.mesh, known_facts(placement, self._reading(None)))
+                share = 0.5 if args.both else 1
+                compared = self._work(comparing, index + 1, share, f"scoring {name}", seconds)
+                reverse = None
+                if args.both:
+                    turned = self.measurement.reverse(placement.mesh)
+                    reverse = self._work(turned, index + 1 + share, share, f"scoring {name} as the reference", seconds)
                 result = compared.result
                 self.last = compared
                 pair = replace(
@@ -238,7 +273,9 @@ class Run:
                     patches=len(result.patches),
                     samples=len(result.samples.positions),
                     space=placement.label,
-                    warnings=(*placement.notes, *placement.warnings, *result.warnings),
+                    warnings=(*placement.notes, *placement.warnings, *compared.warnings),
+                    reverse=reverse,
+                    trust=trust_dict(compared.trust),
                 )
             except FMQMError as reason:
                 pair = replace(pair, error=str(reason))
@@ -252,15 +289,33 @@ class Run:
 
     def _load(self, spec: str, image: str | None) -> Placed:
         from fmqm_addon.blender.files import load_placed
+
+        return load_placed(spec, self._reading(image))
+
+    def _reading(self, image: str | None) -> Reading:
+        """How an asset is read whose texture, if not None, is the image."""
+        from fmqm_addon.blender.headers import DEFAULT_LIMITS, Limits
         from fmqm_addon.blender.images import load_texture
         from fmqm_addon.blender.material import Reading
 
-        return load_placed(spec, Reading(texture=load_texture(image) if image else None))
+        args = self.args
+        limits = Limits(
+            args.max_image_side or DEFAULT_LIMITS.side,
+            args.max_image_bytes or DEFAULT_LIMITS.decoded,
+        )
+        reading = Reading(texture=load_texture(image, limits) if image else None, limits=limits)
+        return reading if args.bake is None else replace(reading, bake=args.bake, stand_in=args.bake > 0)
 
-    def _work(self, stepper: Stepper[T], index: int, text: str, seconds: dict[str, float]) -> T:
+    def _tell_memory(self, reference: Placed) -> None:
+        from fmqm_addon.blender.memory import WORTH_SAYING, peak_bytes, peak_text
+
+        if not self.args.quiet and peak_bytes(reference.mesh, self.settings, self.args.repeats) > WORTH_SAYING:
+            print(f"score.py: {peak_text(reference.mesh, self.settings, self.args.repeats)}", file=sys.stderr)
+
+    def _work(self, stepper: Stepper[T], first: float, share: float, text: str, seconds: dict[str, float]) -> T:
         """Runs a stepper to its end with its progress shown and its seconds added up by stage."""
         while stepper.step():
-            self._progress.show(index + stepper.progress.done, text)
+            self._progress.show(first + share * stepper.progress.done, text)
         for stage, spent in stepper.seconds.items():
             seconds[stage] = seconds.get(stage, 0.0) + spent
         return stepper.result

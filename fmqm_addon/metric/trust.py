@@ -32,6 +32,7 @@ FLIPPED_COSINE = -0.5  # between the faces nearest to a sample, which noise and 
 # squares cosines and cannot see it
 ADDED_DISTANCE = 0.1  # of the median patch diagonal: far beyond what an LOD moves its surface
 ADDED_POINTS = 20_000  # over the distorted mesh; a share of 0.5 % is known to 0.05 %
+NO_MATERIAL = "(no material)"
 OPAQUE = 0.5  # a lower alpha is see-through
 UV_EDGE = 1e-5  # texture coordinates this far outside [0, 1] are on its edge, up to float32
 UV_GRIDS = (512, 256, 128, 64)  # cells a side of the texture; the first one that costs no more than
@@ -141,7 +142,9 @@ def surface_facts(surface: Surface) -> Work[tuple[Fact, ...]]:
         Fact("watertight", open_edges == 0 and non_manifold == 0, "yes or no"),
         Fact("box", surface.frame.leave(_box(surface.vertices)).tolist(), "scene units"),
         *_uv_facts(uv, areas[layers >= 0], overlapping),
-        Fact("colors_from", {material.name: material.how for material in surface.materials}, "by material"),
+        Fact(
+            "colors_from", {material.name or NO_MATERIAL: material.how for material in surface.materials}, "by material"
+        ),
         Fact("images", _images(surface), "pixels"),
     )
 
@@ -348,7 +351,8 @@ def _samples_by_material(surface: Surface, fields: Fields) -> dict[str, float]:
     counts = np.bincount(surface.material[fields.triangle], minlength=len(surface.materials))
     shares: dict[str, float] = {}
     for material, count in zip(surface.materials, counts.tolist(), strict=True):
-        shares[material.name] = shares.get(material.name, 0.0) + count / len(fields.triangle)
+        name = material.name or NO_MATERIAL
+        shares[name] = shares.get(name, 0.0) + count / len(fields.triangle)
     return shares
 
 

@@ -9,14 +9,16 @@ from typing import Any
 
 from ..metric.trust import Fact, Trust
 
+Report = dict[str, dict[str, dict[str, Any]]]  # group, fact, "value" and "unit"
+
 GROUPS = ("reference", "distorted", "pair")
 SHARE = "share"  # what the unit of a share in [0, 1] begins with
 _UNKNOWN = "?"
 _APART = {"settings", "images"}  # not in the table: said elsewhere, and in lines of their own
 
 
-def trust_dict(trust: Trust) -> dict[str, dict[str, dict[str, Any]]]:
-    """Facts by group and name, each {"value": ..., "unit": ...}; one that is not known says "why" beside null."""
+def trust_dict(trust: Trust) -> Report:
+    """Facts by group and name, each {"value": ..., "unit": ...}; one that is not known is null and says "why"."""
     return {group: {fact.name: _fact_dict(fact) for fact in getattr(trust, group)} for group in GROUPS}
 
 
@@ -33,7 +35,7 @@ class Line:
     unit: str
 
 
-def trust_lines(report: dict[str, dict[str, dict[str, Any]]]) -> list[Line]:
+def trust_lines(report: Report) -> list[Line]:
     """What trust_dict gave, line by line: the meshes' facts, the pair's, the images."""
     reference, distorted, pair = (report[group] for group in GROUPS)
     lines = [
@@ -52,7 +54,7 @@ def trust_lines(report: dict[str, dict[str, dict[str, Any]]]) -> list[Line]:
     return lines
 
 
-def trust_text(report: dict[str, dict[str, dict[str, Any]]]) -> str:
+def trust_text(report: Report) -> str:
     """An aligned table."""
     lines = trust_lines(report)
     labels = max(len(line.label) for line in lines)
