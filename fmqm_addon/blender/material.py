@@ -162,7 +162,7 @@ def _read_look(material: bpy.types.Material | None, cache: TextureCache, reading
         return Unread(error.node, error.why, used_images(material, cache))
     uv = next((reader.channel(layer) for layer in reader.layers if layer.kind == "uv"), None)
     made = Material(material.name, color, alpha, "read", used_images(material, cache), uv)
-    return Look(made, tuple(reader.layers), tuple(reader.warnings))
+    return Look(made, tuple(reader.layers), tuple(dict.fromkeys(reader.warnings)))
 
 
 def plain_look(material: bpy.types.Material, warning: str) -> Look:

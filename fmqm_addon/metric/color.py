@@ -418,7 +418,7 @@ class Tiles:
 
     def _parts(self, uv: Floats) -> Iterator[tuple[Texture, NDArray[np.int64], Floats]]:
         """Each tile that is seen, where, and at which of its own coordinates."""
-        whole = np.trunc(uv)  # as Cycles: from -1 to 0 belongs to the first
+        whole = np.trunc(uv)  # as Cycles: what lies between -1 and 0 belongs to the first tile
         for place, texture in self.tiles:
             here = np.flatnonzero((whole == place).all(axis=1))
             if here.size:

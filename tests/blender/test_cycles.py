@@ -390,6 +390,85 @@ def nested_groups(scene: Scene) -> Sockets:
     return group.outputs["Color"], None
 
 
+@construction
+def vector_as_alpha(scene: Scene) -> Sockets:
+    """As the USD importer scales an opacity."""
+    node, math = scene.image(), scene.node("VectorMath", operation="MULTIPLY")
+    math.inputs[1].default_value = (0.2, 0.9, 0.6)
+    scene.link(node.outputs["Color"], math.inputs[0])
+    return node.outputs["Color"], math.outputs[0]
+
+
+@construction
+def arithmetic_in_alpha(scene: Scene) -> Sockets:
+    node = scene.image(noise(4))
+    alpha = node.outputs["Alpha"]
+    for operation, second, clamp in (
+        ("MULTIPLY", 2.5, False),
+        ("SUBTRACT", 0.4, False),
+        ("MINIMUM", 1.3, False),
+        ("MAXIMUM", -0.2, True),
+        ("ADD", 0.1, False),
+        ("MULTIPLY_ADD", 0.9, False),
+    ):
+        math = scene.node("Math", operation=operation, use_clamp=clamp)
+        math.inputs[1].default_value, math.inputs[2].default_value = second, 0.05
+        scene.link(alpha, math.inputs[0])
+        alpha = math.outputs[0]
+    return node.outputs["Color"], alpha
+
+
+@construction
+def rounded_alpha(scene: Scene) -> Sockets:
+    node, math = scene.image(noise(4)), scene.node("Math", operation="ROUND")
+    scene.link(node.outputs["Alpha"], math.inputs[0])
+    return node.outputs["Color"], math.outputs[0]
+
+
+@construction
+def alpha_greater_than(scene: Scene) -> Sockets:
+    node, math = scene.image(noise(4)), scene.node("Math", operation="GREATER_THAN")
+    math.inputs[1].default_value = 0.3
+    scene.link(node.outputs["Alpha"], math.inputs[0])
+    return node.outputs["Color"], math.outputs[0]
+
+
+@construction
+def clamped_legacy_mix(scene: Scene) -> Sockets:
+    mix = scene.node("MixRGB", blend_type="MIX", use_clamp=True)
+    mix.inputs["Fac"].default_value = 0.6
+    mix.inputs["Color2"].default_value = (3.0, 0.2, 0.5, 1)
+    scene.link(scene.image().outputs["Color"], mix.inputs["Color1"])
+    return mix.outputs["Color"], None
+
+
+def udim(scene: Scene, *numbers: int) -> bpy.types.Node:
+    """An image node with tiles of 7 x 5 pixels with alpha."""
+    for number in numbers:
+        scenes.write_png(scene.folder / f"t.{number}.png", np.random.default_rng(number).permutation(noise(4)))
+    image = bpy.data.images.load(str(scene.folder / f"t.{numbers[0]}.png"))
+    image.source = "TILED"
+    image.filepath = str(scene.folder / "t.<UDIM>.png")
+    for number in numbers[1:]:
+        image.tiles.new(number)
+    return scene.node("TexImage", image=image)
+
+
+@construction
+def tiles_with_gaps(scene: Scene) -> Sockets:
+    """Places that no tile covers are magenta; those just below 0 belong to the first tile."""
+    node = udim(scene, 1001, 1002, 1012)
+    return node.outputs["Color"], node.outputs["Alpha"]
+
+
+@construction
+def packed_tiles(scene: Scene) -> Sockets:
+    node = udim(scene, 1001, 1002, 1011, 1012)
+    node.image.pack()
+    node.extension, node.interpolation = "EXTEND", "Closest"
+    return node.outputs["Color"], None
+
+
 @pytest.fixture
 def scene(tmp_path: Path) -> Scene:
     return Scene(tmp_path)
@@ -487,3 +566,160 @@ def test_mix(scene: Scene, blend: str, factor: float, clamps: tuple[bool, bool])
     scene.link(node.outputs["Color"], mix.inputs[6])
     scene.link(paint.outputs["Color"], mix.inputs[7])
     finish(scene, (mix.outputs[2], None))
+
+
+def as_unlit(scene: Scene, see_through: bool) -> None:
+    """As the glTF importer builds unlit materials."""
+    node, emission = scene.image(noise(4), mode="CHANNEL_PACKED"), scene.node("Emission")
+    transparent, mix = scene.node("BsdfTransparent"), scene.node("MixShader")
+    scene.link(node.outputs["Color"], emission.inputs["Color"])
+    scene.link(scene.node("LightPath").outputs["Is Camera Ray"], mix.inputs[0])
+    scene.link(transparent.outputs[0], mix.inputs[1])
+    scene.link(emission.outputs[0], mix.inputs[2])
+    if see_through:
+        inner, mix = mix, scene.node("MixShader")
+        scene.link(node.outputs["Alpha"], mix.inputs[0])
+        scene.link(transparent.outputs[0], mix.inputs[1])
+        scene.link(inner.outputs[0], mix.inputs[2])
+    scene.tree.nodes.remove(scene.shader())
+    scene.link(mix.outputs[0], scene.tree.get_output_node("ALL").inputs["Surface"])
+
+
+@pytest.mark.parametrize("see_through", [False, True])
+def test_unlit(scene: Scene, see_through: bool) -> None:
+    as_unlit(scene, see_through)
+    node = next(node for node in scene.tree.nodes if node.type == "TEX_IMAGE")
+    shown, opacity = seen(scene.surface())
+    alpha = node.outputs["Alpha"]
+    np.testing.assert_allclose(shown, encode_srgb(bake(scene, node.outputs["Color"], alpha)), rtol=0, atol=TOLERANCE)
+    wanted = bake(scene, alpha, None, as_number=True)[:, :, 0] if see_through else np.ones_like(opacity)
+    np.testing.assert_allclose(opacity, wanted, rtol=0, atol=TOLERANCE)
+
+
+@pytest.mark.parametrize("strength", [1.0, 0.4, 3.0])
+def test_emission(scene: Scene, strength: float) -> None:
+    """Baked as it is, strength and all."""
+    emission, output = scene.node("Emission"), scene.tree.get_output_node("ALL")
+    emission.inputs["Strength"].default_value = strength
+    scene.link(scene.image().outputs["Color"], emission.inputs["Color"])
+    scene.link(emission.outputs[0], output.inputs["Surface"])
+    shown, _ = seen(scene.surface())
+    target = bpy.data.images.new("target", SIDE, SIDE, float_buffer=True, is_data=True)
+    scene.tree.nodes.active = scene.node("TexImage", image=target)
+    with cycles(scene.object):
+        bpy.ops.object.bake(type="EMIT", margin=0)
+    wanted = np.array(target.pixels).reshape(SIDE, SIDE, 4)[:, :, :3]
+    np.testing.assert_allclose(shown, encode_srgb(wanted), rtol=0, atol=TOLERANCE)
+
+
+@pytest.mark.parametrize("first", ["transparent", "principled"])
+@pytest.mark.parametrize("varies", [False, True])
+def test_mixed_with_transparent(scene: Scene, first: str, varies: bool) -> None:
+    """Alpha is how much of the other shader there is, on either side of the mix."""
+    node, mix, shader = scene.image(noise(4)), scene.node("MixShader"), scene.shader()
+    scene.link(node.outputs["Color"], shader.inputs["Base Color"])
+    sides = [scene.node("BsdfTransparent").outputs[0], shader.outputs[0]]
+    for number, side in enumerate(sides if first == "transparent" else sides[::-1], 1):
+        scene.link(side, mix.inputs[number])
+    if varies:
+        scene.link(node.outputs["Alpha"], mix.inputs[0])
+    else:
+        mix.inputs[0].default_value = 0.3
+    scene.link(mix.outputs[0], scene.tree.get_output_node("ALL").inputs["Surface"])
+    shown, opacity = seen(scene.surface())
+    alpha = node.outputs["Alpha"]
+    wanted = encode_srgb(bake(scene, node.outputs["Color"], alpha if varies else None))
+    np.testing.assert_allclose(shown, wanted, rtol=0, atol=TOLERANCE)
+    factor = bake(scene, alpha, None, as_number=True)[:, :, 0] if varies else np.full_like(opacity, 0.3)
+    np.testing.assert_allclose(opacity, factor if first == "transparent" else 1 - factor, rtol=0, atol=TOLERANCE)
+
+
+USD = """#usda 1.0
+(defaultPrim = "root" upAxis = "Z")
+def Xform "root" {{
+  def Mesh "square" (prepend apiSchemas = ["MaterialBindingAPI"]) {{
+    int[] faceVertexCounts = [4]
+    int[] faceVertexIndices = [0, 1, 2, 3]
+    point3f[] points = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
+    texCoord2f[] primvars:Bake = [(0, 0), (1, 0), (1, 1), (0, 1)] (interpolation = "vertex")
+    rel material:binding = </root/M>
+  }}
+  def Material "M" {{
+    token outputs:surface.connect = </root/M/S.outputs:surface>
+    def Shader "S" {{
+      uniform token info:id = "UsdPreviewSurface"
+      color3f inputs:diffuseColor.connect = </root/M/T.outputs:rgb>
+      float inputs:opacity.connect = </root/M/T.outputs:a>
+      {surface}
+      token outputs:surface
+    }}
+    def Shader "T" {{
+      uniform token info:id = "UsdUVTexture"
+      asset inputs:file = @./image.png@
+      float2 inputs:st.connect = </root/M/X.outputs:result>
+      token inputs:wrapS = "mirror"
+      token inputs:wrapT = "mirror"
+      {texture}
+      float3 outputs:rgb
+      float outputs:a
+    }}
+    def Shader "X" {{
+      uniform token info:id = "UsdTransform2d"
+      float2 inputs:in.connect = </root/M/P.outputs:result>
+      float inputs:rotation = 30
+      float2 inputs:scale = (2, 3)
+      float2 inputs:translation = (0.1, 0.2)
+      float2 outputs:result
+    }}
+    def Shader "P" {{
+      uniform token info:id = "UsdPrimvarReader_float2"
+      string inputs:varname = "Bake"
+      float2 outputs:result
+    }}
+  }}
+}}
+"""
+SCALE_AND_BIAS = "float4 inputs:scale = (0.5, 0.6, 0.7, 0.9)  float4 inputs:bias = (0.1, 0, 0, 0.05)"
+OBJ = """mtllib square.mtl
+v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0
+vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1
+usemtl M
+f 1/1 2/2 3/3 4/4
+"""
+MTL = """newmtl M
+Kd 0.5 0.2 0.1
+map_Kd -s 2 3 1 -o 0.1 0.2 0 image.png
+map_d -s 2 2 1 image.png
+"""
+
+
+def imported(scene: Scene, name: str) -> None:
+    """The scene becomes what an importer makes of a file in its folder; the one UV map is the square as it lies."""
+    scenes.clear()
+    path = str(scene.folder / name)
+    if name.endswith(".obj"):
+        bpy.ops.wm.obj_import(filepath=path, forward_axis="Y", up_axis="Z")
+    else:
+        bpy.ops.wm.usd_import(filepath=path)
+    scene.object = next(object_ for object_ in bpy.data.objects if object_.type == "MESH")
+    scene.material = scene.object.data.materials[0]
+    scene.tree = scene.material.node_tree
+    bpy.context.view_layer.update()
+
+
+@pytest.mark.parametrize(
+    ("surface", "texture"), [("", ""), ("float inputs:opacityThreshold = 0.4", ""), ("", SCALE_AND_BIAS)]
+)
+def test_usd(scene: Scene, surface: str, texture: str) -> None:
+    scenes.write_png(scene.folder / "image.png", noise(4))
+    (scene.folder / "square.usda").write_text(USD.format(surface=surface, texture=texture), encoding="utf-8")
+    imported(scene, "square.usda")
+    check(scene)
+
+
+def test_obj(scene: Scene) -> None:
+    scenes.write_png(scene.folder / "image.png", noise(4))
+    (scene.folder / "square.obj").write_text(OBJ, encoding="utf-8")
+    (scene.folder / "square.mtl").write_text(MTL, encoding="utf-8")
+    imported(scene, "square.obj")
+    check(scene)
