@@ -65,6 +65,9 @@ def _convert(
         if link.to_socket.type == "SHADER" and link.from_socket.type != "SHADER":
             _emission(tree, link.from_socket, [link.to_socket])
     for node in list(tree.nodes):
+        if node.type == "SHADERTORGB":
+            _pass_color(tree, node)
+    for node in list(tree.nodes):
         outputs = [socket for socket in node.outputs if socket.type == "SHADER"]
         if not outputs or node.mute:
             continue
@@ -87,6 +90,22 @@ def _group(
     return groups[key]
 
 
+def _pass_color(tree: bpy.types.NodeTree, node: bpy.types.Node) -> None:
+    """Shader to RGB, which Cycles lacks: the color of the shader before it, as if in full light."""
+    link = next(iter(node.inputs[0].links), None)
+    wanted = None if link is None else _color_of(link.from_node)
+    if wanted is None:
+        return
+    passed = tree.nodes.new("ShaderNodeGamma")  # of 1: hands a color on
+    _take_over(tree, wanted, passed.inputs["Color"])
+    for each in list(node.outputs["Color"].links):
+        tree.links.new(passed.outputs[0], each.to_socket)
+
+
+def _color_of(shader: bpy.types.Node) -> bpy.types.NodeSocket | None:
+    return shader.inputs.get("Base Color") or shader.inputs.get("Color")
+
+
 def _never_wholly(tree: bpy.types.NodeTree, factor: bpy.types.NodeSocket) -> None:
     if not factor.is_linked:
         factor.default_value = min(max(factor.default_value, _LEAST_SHARE), 1 - _LEAST_SHARE)
@@ -101,7 +120,7 @@ def _replace(tree: bpy.types.NodeTree, node: bpy.types.Node, output: bpy.types.N
     targets = [link.to_socket for link in output.links]
     color = _emission(tree, None, targets)
     if shine is Shine.COLOR:
-        wanted = node.inputs.get("Base Color") or node.inputs.get("Color")
+        wanted = _color_of(node)
         if node.type not in _TRANSPARENT and wanted is not None:
             _take_over(tree, wanted, color)
         if "Alpha" in node.inputs and node.inputs["Alpha"].is_linked:

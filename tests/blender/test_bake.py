@@ -15,9 +15,12 @@ import pytest
 
 from fmqm_addon.blender import bake
 from fmqm_addon.blender.bake import Baked, bake_slots
-from fmqm_addon.blender.material import Unread
+from fmqm_addon.blender.bvh import BVHQuery
+from fmqm_addon.blender.material import Reading, Unread
+from fmqm_addon.blender.mesh import mesh_arrays
 from fmqm_addon.metric.color import Texture, decode_srgb, encode_srgb
 from fmqm_addon.metric.errors import MeshError
+from fmqm_addon.metric.surface import prepare_surface
 
 from . import scenes
 
@@ -268,6 +271,23 @@ def test_shaders_inside_groups() -> None:
     assert leaf.id_data == inner and [each.type for each in inner.nodes].count("BSDF_DIFFUSE") == 1
 
 
+def test_shader_to_rgb_passes_the_shaders_color() -> None:
+    """As toon materials have it, here turned to its negative; Cycles itself knows no such node."""
+    for linked in (True, False):
+        material = scenes.material()
+        tree = material.node_tree
+        leaf = shader(tree, "ShaderNodeBsdfDiffuse", gradient(tree) if linked else (0.2, 0.4, 0.6))
+        negative = node(tree, "ShaderNodeInvert")
+        converted = node(tree, "ShaderNodeShaderToRGB")
+        tree.links.new(leaf.outputs[0], converted.inputs[0])
+        tree.links.new(converted.outputs[0], negative.inputs["Color"])
+        tree.links.new(shader(tree, "ShaderNodeEmission", negative.outputs[0]).outputs[0], surface(material))
+        object_ = scenes.square(materials=[material])
+        seen = look_at(object_, baked(object_, 64)[0])
+        wanted = encode_srgb(1 - (0.5 + 0.3 * seen.position if linked else np.array([0.2, 0.4, 0.6])))
+        assert np.abs(seen.color - wanted).max() < 2 * CLOSE
+
+
 def test_a_color_at_the_shaders_place() -> None:
     material = scenes.material()
     tree = material.node_tree
@@ -505,3 +525,37 @@ print("only this", file=out, flush=True)
     root = str(Path(__file__).resolve().parents[2])
     done = subprocess.run([sys.executable, "-c", program, root], capture_output=True, text=True, check=True)
     assert done.stdout == "only this\n"
+
+
+def test_meshes_are_baked_where_they_cannot_be_read() -> None:
+    object_ = scenes.cube("Crate", materials=[procedural("Rust"), scenes.material("Plain", (0.1, 0.5, 0.9))])
+    object_.matrix_world = scenes.PLACED
+    object_.data.polygons[3].material_index = 1
+    arrays = mesh_arrays([object_], "asset", Reading(bake=128))
+    assert [each.how for each in arrays.materials] == ["baked", "read"]
+    assert [warning for warning in arrays.warnings if "Rust" in warning and "baked at 128 x 128" in warning]
+    surface = prepare_surface(arrays, BVHQuery)
+    rng = np.random.default_rng(0)
+    triangle, place = rng.integers(0, 12, 500), rng.dirichlet((1, 1, 1), 500)
+    position = np.einsum("nk,nkc->nc", place, surface.vertices[surface.triangles[triangle]])
+    local = surface.frame.leave(position) @ np.linalg.inv(np.array(scenes.PLACED))[:3, :3].T
+    local += np.linalg.inv(np.array(scenes.PLACED))[:3, 3]
+    plain = surface.material[triangle] == 1
+    wanted = np.where(plain[:, None], encode_srgb([0.1, 0.5, 0.9]), of_gradient(local))
+    assert plain.any() and np.abs(surface.color_at(triangle, place) - wanted).max() < CLOSE
+
+
+@pytest.mark.parametrize("size", [0, 64], ids=["forbidden", "failing"])
+def test_plain_color_where_baking_is_impossible(size: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise RuntimeError("Error: the baker is ill")
+
+    monkeypatch.setattr(bake, "_run", fail)
+    material = procedural("Rust")
+    scenes.base_color(material).default_value = (0.1, 0.5, 0.9, 1)
+    arrays = mesh_arrays([scenes.cube("Crate", materials=[material])], "asset", Reading(bake=size))
+    assert arrays.materials[0].how == "plain"
+    assert arrays.materials[0].color.lookup(np.zeros((1, 2)))[0] == pytest.approx(encode_srgb([0.1, 0.5, 0.9]))
+    (warning,) = arrays.warnings
+    assert "material Rust: Texture Coordinate is not read" in warning and "plain color" in warning
+    assert ("the baker is ill" in warning) is (size > 0)
