@@ -32,6 +32,7 @@ def measure(
     match_scale: bool = False,
     repeats: int = 1,
     reference_without_modifiers: bool = False,
+    both: bool = False,
 ) -> list[Outcome]:
     """Scores of objects or collections against a reference.
 
@@ -43,11 +44,12 @@ def measure(
         repeats: measure with so many seeds; scores become means.
         reference_without_modifiers: the reference is its mesh without modifiers, so that an object can be
             measured against itself.
+        both: score the other direction too: `outcome.reverse`, (5,) float64 like the scores.
 
     Returns:
         One outcome per distorted asset, in their order; `outcome.scores` is (5,) float64 in the order of
         COLUMNS, or None with the reason in `outcome.error`. `outcome.comparison.result` is a metric.score.Result
-        with patches, samples and fields.
+        with patches, samples and fields, `outcome.trust` a metric.trust.Trust: how far to believe the scores.
     """
     assets = [distorted] if isinstance(distorted, (bpy.types.Object, bpy.types.Collection)) else list(distorted)
     stepper = measuring(
@@ -57,5 +59,6 @@ def measure(
         repeats,
         space,
         match_scale,
+        both,
     )
     return stepper.run()

@@ -12,9 +12,12 @@ from ..metric.score import Progress, Stepper, Work
 from ..metric.settings import Settings
 from ..metric.spatial import Floats
 from ..metric.surface import Surface
+from ..metric.trust import Trust
 from .measure import Comparison, Measurement
+from .mesh import AS_FOUND
 from .snapshot import Target, fingerprint, take
 from .space import Placed, Placement, place, place_counts
+from .trust import known_facts
 
 _READING = 0.05  # share of the whole that reading the scene takes, about
 
@@ -29,6 +32,7 @@ class Outcome:
         triangles, reference_triangles: counts after triangulation, before anything is left out.
         seconds: by report.pair.STAGES; reading and preparing the reference count in the first outcome.
         fingerprint: of reference and compared, as they were when they were read; see pair_fingerprint.
+        reverse: (5,) float64 scores of the other direction, where they were asked for.
         error: why there is no score.
     """
 
@@ -41,6 +45,7 @@ class Outcome:
     reference_triangles: int = 0
     seconds: dict[str, float] = field(default_factory=dict)
     fingerprint: tuple[str, str] = ("", "")
+    reverse: Floats | None = None
     error: str | None = None
 
     @property
@@ -49,10 +54,15 @@ class Outcome:
         return None if self.comparison is None else self.comparison.scores
 
     @property
+    def trust(self) -> Trust | None:
+        """How far to trust the scores; None where there is an error."""
+        return None if self.comparison is None else self.comparison.trust
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """What should be known before the scores are believed."""
         own = () if self.placement is None else self.placement.warnings
-        return own + (() if self.comparison is None else self.comparison.result.warnings)
+        return own + (() if self.comparison is None else self.comparison.warnings)
 
 
 def pair_fingerprint(reference: Target, target: Target, label: str) -> tuple[str, str]:
@@ -68,6 +78,7 @@ def measuring(
     repeats: int = 1,
     space: str = "auto",
     match_scale: bool = False,
+    both: bool = False,
     finished: Callable[[Outcome], None] = lambda _: None,
 ) -> Stepper[list[Outcome]]:
     """A stepper over reading, preparing and comparing.
@@ -78,9 +89,10 @@ def measuring(
     Args:
         repeats: seeds settings.seed to settings.seed + repeats - 1.
         space, match_scale: as in blender.space.place.
+        both: score the other direction too.
         finished: gets each outcome as soon as it is there.
     """
-    return Stepper(_work(reference, compared, settings, repeats, space, match_scale, finished))
+    return Stepper(_work(reference, compared, settings, repeats, space, match_scale, both, finished))
 
 
 def _work(
@@ -90,6 +102,7 @@ def _work(
     repeats: int,
     space: str,
     match_scale: bool,
+    both: bool,
     finished: Callable[[Outcome], None],
 ) -> Work[list[Outcome]]:
     # Read all, then measure: the user may go on working meanwhile.
@@ -119,10 +132,18 @@ def _work(
             began = _READING + share * (index + 1)
             try:
                 placement = place(original.placed, item.placed, space, match_scale)
-                comparing = measurement.compare(placement.mesh)
+                comparing = measurement.compare(placement.mesh, known_facts(placement, AS_FOUND))
+                one = share / 2 if both else share
                 while comparing.step():
-                    yield Progress(f"Measuring {item.target.label}", began + share * comparing.progress.done)
+                    yield Progress(f"Measuring {item.target.label}", began + one * comparing.progress.done)
                 seconds = _added(seconds, comparing.seconds)
+                reverse = None
+                if both:
+                    turned = measurement.reverse(placement.mesh)
+                    while turned.step():
+                        yield Progress(f"Measuring from {item.target.label}", began + one * (1 + turned.progress.done))
+                    reverse = turned.result
+                    seconds = _added(seconds, turned.seconds)
                 outcome = Outcome(
                     reference,
                     item.target,
@@ -132,6 +153,7 @@ def _work(
                     triangles=len(item.placed.mesh.triangles),
                     reference_triangles=len(original.placed.mesh.triangles),
                     fingerprint=(original.mark(placement), item.mark(placement)),
+                    reverse=reverse,
                     seconds={**seconds, "total": sum(seconds.values())},
                 )
             except FMQMError as reason:

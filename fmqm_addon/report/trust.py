@@ -76,7 +76,7 @@ def _fact_dict(fact: Fact) -> dict[str, Any]:
 
 
 def _label(name: str) -> str:
-    return name.replace("_", " ")
+    return name.replace("_", " ").replace("uv ", "UV ")
 
 
 def _unit(item: dict[str, Any]) -> str:

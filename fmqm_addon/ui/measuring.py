@@ -16,6 +16,7 @@ from ..blender.job import Outcome, measuring
 from ..blender.snapshot import Target, target_of
 from ..metric.errors import FMQMError
 from ..metric.score import Stepper
+from ..report.trust import trust_dict
 from . import session, watch
 from .inputs import reference_of
 from .properties import PRESET_PROPERTIES, FMQMRow, item_target, metric_settings, numbers_text
@@ -152,7 +153,11 @@ class FMQM_OT_measure(bpy.types.Operator):  # noqa: N801
         self._scene = context.scene.name_full
         self._settings_text = json.dumps({**settings.as_dict(), **asked})
         self._stepper = measuring(
-            target_of(reference_of(fmqm), fmqm.bare_reference), list(dict.fromkeys(compared)), settings, **asked
+            target_of(reference_of(fmqm), fmqm.bare_reference),
+            list(dict.fromkeys(compared)),
+            settings,
+            **asked,
+            both=fmqm.settings.both,
         )
         return True
 
@@ -218,6 +223,8 @@ def _write_row(fmqm: FMQMScene, outcome: Outcome, settings_text: str) -> None:
     row.space = "" if placement is None else placement.label
     row.scores = "" if comparison is None else numbers_text(comparison.scores)
     row.stderr = "" if comparison is None or comparison.stderr is None else numbers_text(comparison.stderr)
+    row.reverse = "" if outcome.reverse is None else numbers_text(outcome.reverse)
+    row.trust = "" if outcome.trust is None else json.dumps(trust_dict(outcome.trust), allow_nan=False)
     row.patches = 0 if comparison is None else len(comparison.result.patches)
     row.samples = 0 if comparison is None else len(comparison.result.samples.positions)
     if comparison is not None and placement is not None and outcome.reference is not None:

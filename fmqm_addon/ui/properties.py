@@ -15,6 +15,7 @@ from ..blender.assets import SURFACE_TYPES
 from ..blender.space import SPACES
 from ..metric.score import COLUMNS
 from ..metric.settings import FAST_SCORED_PATCHES, SETTING_NAMES, Settings
+from ..report.trust import Report
 
 SEED_LIMIT = 2**31 - 1  # of an IntProperty
 CUSTOM = "CUSTOM"
@@ -71,6 +72,8 @@ class FMQMRow(bpy.types.PropertyGroup):
     error: StringProperty(name="Error", description="Why there is no score")
     space: StringProperty(name="Space", description="Where the two were compared")
     settings: StringProperty(name="Settings", description="Settings of the measurement, as JSON")
+    reverse: StringProperty(name="Reverse", description="Scores of the other direction, as JSON; empty: not measured")
+    trust: StringProperty(name="Trust", description="How far to trust the scores: facts with their units, as JSON")
     fingerprint: StringProperty(name="Fingerprint", description="Tells whether what was measured has changed since")
 
 
@@ -82,6 +85,17 @@ def row_scores(row: FMQMRow) -> dict[str, float] | None:
 def row_stderr(row: FMQMRow) -> dict[str, float] | None:
     """Standard errors of the scores over the seeds; None for one seed."""
     return _columns(row.stderr)
+
+
+def row_reverse(row: FMQMRow) -> dict[str, float] | None:
+    """Scores of the other direction, the compared as the reference; None where they were not measured."""
+    return _columns(row.reverse)
+
+
+def row_trust(row: FMQMRow) -> Report | None:
+    """The trust report of a row; None for a row with an error."""
+    report: Report | None = json.loads(row.trust) if row.trust else None
+    return report
 
 
 def numbers_text(values: Any) -> str:
@@ -232,11 +246,16 @@ class FMQMSettings(bpy.types.PropertyGroup):
         description="Undo a difference in size by a factor between units, such as 100, 1000 or 2.54",
         default=False,
     )
+    both: BoolProperty(
+        name="Both Directions",
+        description="Score the compared as the reference too, which sees what only it has. Takes twice as long",
+        default=False,
+    )
 
 
 # In the order in which operator presets save them; space and seed are the scene's, not a preset's.
 PRESET_PROPERTIES = tuple(
-    name for name in FMQMSettings.__annotations__ if name not in {"preset", "seed", "space", "match_scale"}
+    name for name in FMQMSettings.__annotations__ if name not in {"preset", "seed", "space", "match_scale", "both"}
 )
 _PAPER: dict[str, Any] = {
     **{name: getattr(Settings(), name) for name in SETTING_NAMES if name not in {"seed", "scored_patches"}},
