@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 from mathutils import Matrix, Vector
 
+from fmqm_addon.blender import bake, mesh
 from fmqm_addon.blender.assets import check_object, metaball_mother, scene_members
 from fmqm_addon.blender.evaluate import evaluated
 from fmqm_addon.blender.files import load_mesh, load_placed
+from fmqm_addon.blender.material import Reading
 from fmqm_addon.blender.measure import Measurement
 from fmqm_addon.blender.mesh import mesh_arrays
 from fmqm_addon.blender.snapshot import fingerprint, take, target_of
@@ -410,3 +412,64 @@ def test_evaluated_objects_keep_their_order() -> None:
     with evaluated(objects) as found:
         assert [each.original for each in found] == objects
         assert found[1].object.original != objects[1] and found[0].object.original == objects[0]
+
+
+# What has to be baked
+
+
+def procedural() -> bpy.types.Material:
+    made = scenes.material("Veins")
+    noise = made.node_tree.nodes.new("ShaderNodeTexNoise")
+    made.node_tree.links.new(noise.outputs[1], scenes.base_color(made))
+    return made
+
+
+@pytest.mark.parametrize("hidden", [False, True], ids=["visible", "hidden"])
+def test_what_cannot_be_read_is_baked_once_for_all_instances(hidden: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    shape = library("Shape")
+    cube = scenes.cube("Cube", collection=shape, materials=[scenes.material("Red", (1, 0, 0)), procedural()])
+    cube.data.polygons.foreach_set("material_index", [0, 1, 1, 0, 1, 1])
+    ground = collection("Ground")
+    for number in range(3):
+        instancer(f"Stone {number}", shape, ground).location.x = 3 * number
+    ground.hide_viewport = hidden
+    baked = []
+
+    def bake_slots(object_: bpy.types.Object, *rest: object) -> object:
+        baked.append(object_.name)
+        return bake.bake_slots(object_, *rest)
+
+    monkeypatch.setattr(mesh, "bake_slots", bake_slots)
+    before = scenes.blocks()
+    arrays = take(target_of(ground), Reading(bake=64)).mesh
+    assert scenes.blocks() == before
+    assert baked == ["Cube"]
+    assert [(look.name, look.how) for look in arrays.materials] == [("Red", "read"), ("Veins", "baked")]
+    assert np.count_nonzero(arrays.material == 1) == 3 * 8
+    veins = arrays.corners[arrays.material == 1]
+    assert np.ptp(arrays.materials[1].color.lookup(veins.mean(axis=1)), axis=0).max() > 0.05
+
+
+def test_baking_that_is_forbidden() -> None:
+    arrays = mesh_arrays([scenes.cube(materials=[procedural()])], "asset", Reading(bake=0))
+    assert arrays.materials[0].how == "plain"
+    (warning,) = arrays.warnings
+    assert warning.startswith("Cube: material Veins: Noise Texture") and "baking is off" in warning
+
+
+@pytest.mark.parametrize("make", [tube, balls], ids=lambda make: make.__name__)
+def test_other_kinds_are_baked_too(make: Callable[[], bpy.types.Object]) -> None:
+    object_ = make()
+    object_.data.materials.append(procedural())
+    arrays = mesh_arrays([object_], "asset", Reading(bake=64))
+    assert [look.how for look in arrays.materials] == ["baked"]
+
+
+def test_meshes_that_only_instances_have_are_not_baked() -> None:
+    ground = scenes.square("Ground", materials=[scenes.material("Red", (1, 0, 0))])
+    tree = on_points(scenes.square("Source", materials=[scenes.material("Green", (0, 1, 0))]))
+    ground.modifiers.new("Nodes", "NODES").node_group = tree
+    next(node for node in tree.nodes if node.type == "SET_MATERIAL").inputs["Material"].default_value = procedural()
+    arrays = mesh_arrays([ground], "asset", Reading(bake=64))
+    assert {look.name: look.how for look in arrays.materials} == {"Red": "read", "Green": "read", "Veins": "plain"}
+    assert any("a mesh that only instances have" in warning for warning in arrays.warnings)
