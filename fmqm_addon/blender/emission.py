@@ -45,8 +45,6 @@ def shining(material: bpy.types.Material, shine: Shine, temporary: ExitStack) ->
     temporary.callback(bpy.data.materials.remove, copy)
     tree = copy.node_tree
     output = tree.get_output_node("CYCLES") or tree.get_output_node("EEVEE")
-    for node in [node for node in tree.nodes if node.type == "OUTPUT_MATERIAL" and node != output]:
-        tree.nodes.remove(node)
     if output is not None:
         output.target = "ALL"
         for name in ("Volume", "Displacement"):

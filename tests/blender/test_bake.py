@@ -241,6 +241,59 @@ def test_transparency_is_opacity_and_does_not_darken() -> None:
     assert np.abs(seen.opacity - 0.5 * wanted)[sure].max() < CLOSE
 
 
+def test_added_shaders_are_the_sum_of_their_colors() -> None:
+    """Also where one of them makes an opacity necessary."""
+    material = scenes.material(color=(0.2, 0.1, 0.3))
+    tree = material.node_tree
+    principled = scenes.base_color(material).node
+    principled.inputs["Alpha"].default_value = 0.5
+    both = node(tree, "ShaderNodeAddShader")
+    tree.links.new(principled.outputs[0], both.inputs[0])
+    tree.links.new(shader(tree, "ShaderNodeBsdfGlossy", (0.3, 0.2, 0.1)).outputs[0], both.inputs[1])
+    tree.links.new(both.outputs[0], surface(material))
+    object_ = scenes.square(materials=[material])
+    seen = look_at(object_, baked(object_, 32)[0])
+    assert np.abs(seen.color - encode_srgb([0.5, 0.3, 0.4])).max() < CLOSE and (seen.opacity == 1).all()
+
+
+def test_world_position_under_a_shear() -> None:
+    """A parent's scale and a child's turn make a matrix that is no location, rotation and scale."""
+    material = scenes.material()
+    tree = material.node_tree
+    scaled = node(tree, "ShaderNodeVectorMath", operation="MULTIPLY_ADD")
+    scaled.inputs[1].default_value, scaled.inputs[2].default_value = (0.1, 0.1, 0.1), (0.5, 0.5, 0.5)
+    tree.links.new(node(tree, "ShaderNodeNewGeometry").outputs["Position"], scaled.inputs[0])
+    tree.links.new(scaled.outputs[0], scenes.base_color(material))
+    object_ = scenes.cube(materials=[material])
+    object_.parent = bpy.data.objects.new("Parent", None)
+    bpy.context.scene.collection.objects.link(object_.parent)
+    object_.parent.scale, object_.rotation_euler, object_.scale = (1, 2, 0.5), (0.4, 0.5, 0.6), (-1, 1, 1)
+    bpy.context.view_layer.update()
+    seen = look_at(object_, baked(object_)[0])
+    matrix = np.array(object_.matrix_world)
+    world = seen.position @ matrix[:3, :3].T + matrix[:3, 3]
+    assert np.abs(seen.color - encode_srgb(0.5 + 0.1 * world)).max() < CLOSE
+
+
+def test_animated_values_are_those_of_the_frame() -> None:
+    material = scenes.material()
+    tree = material.node_tree
+    leaf = shader(tree, "ShaderNodeBsdfDiffuse", (0.2, 0.2, 0.2))
+    tree.links.new(leaf.outputs[0], surface(material))
+    leaf.inputs["Color"].driver_add("default_value", 0).driver.expression = "frame / 10"
+    bpy.context.scene.frame_set(5)
+    object_ = scenes.square(materials=[material])
+    assert np.abs(look_at(object_, baked(object_, 32)[0]).color - encode_srgb([0.5, 0.2, 0.2])).max() < CLOSE
+
+
+def test_output_that_only_eevee_uses() -> None:
+    material = procedural()
+    material.node_tree.get_output_node("ALL").target = "EEVEE"
+    object_ = scenes.square(materials=[material])
+    seen = look_at(object_, baked(object_, 64)[0])
+    assert np.abs(seen.color - of_gradient(seen.position)).max() < CLOSE
+
+
 def test_alpha_of_the_shader() -> None:
     material = procedural()
     tree = material.node_tree
@@ -308,13 +361,15 @@ def test_neighbors_never_bleed() -> None:
     bpy.ops.object.join()
     mesh = object_.data
     colors = np.random.default_rng(0).integers(0, 2, (len(mesh.polygons), 3)).astype(float)
+    mesh.color_attributes.new("Decoy", "FLOAT_COLOR", "CORNER")
     painted = mesh.color_attributes.new("Paint", "FLOAT_COLOR", "CORNER")
+    mesh.color_attributes.render_color_index = 1
     for face in mesh.polygons:
         for loop in face.loop_indices:
             painted.data[loop].color = (*colors[face.index], 1)
     material = scenes.material()
     material.node_tree.links.new(
-        node(material.node_tree, "ShaderNodeVertexColor", layer_name="Paint").outputs[0], scenes.base_color(material)
+        node(material.node_tree, "ShaderNodeVertexColor").outputs[0], scenes.base_color(material)
     )
     mesh.materials.append(material)
     seen = look_at(object_, baked(object_, 128)[0])
@@ -345,9 +400,13 @@ def test_images_keep_the_uv_map_that_they_had(tmp_path: Path, overlapping: bool)
     pixels = np.kron(np.concatenate([scenes.noise(4), alpha], axis=2), np.ones((16, 16, 1), np.uint8))
     make = scenes.cube if overlapping else scenes.square
     object_ = make(materials=[inverted(scenes.write_png(tmp_path / "image.png", pixels))])
-    found = baked(object_)[0]
     uv = np.empty(2 * len(object_.data.loops), np.float32)
     object_.data.uv_layers[0].uv.foreach_get("vector", uv)
+    decoy = object_.data.uv_layers.new(name="For editing")
+    decoy.uv.foreach_set("vector", uv[::-1] / 3)
+    object_.data.uv_layers.active = decoy
+    assert not decoy.active_render
+    found = baked(object_)[0]
     loops = np.array([face.loops[:] for face in object_.data.loop_triangles])
     own = uv.reshape(-1, 2)[loops]
     assert np.array_equal(own, found.corners) is not overlapping
