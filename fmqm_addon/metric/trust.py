@@ -378,7 +378,8 @@ def _images(surface: Surface) -> list[dict[str, Any]]:
 
 def _diagonal(surface: Surface) -> float:
     low, high = _box(surface.vertices)
-    return float(np.linalg.norm(high - low))
+    longest = float((high - low).max())
+    return longest * float(np.linalg.norm((high - low) / longest))  # no square overflows
 
 
 def _box(vertices: Floats) -> Floats:
