@@ -456,13 +456,15 @@ def udim(scene: Scene, *numbers: int) -> bpy.types.Node:
 
 @construction
 def tiles_with_gaps(scene: Scene) -> Sockets:
-    """Places that no tile covers are magenta; those just below 0 belong to the first tile."""
+    """Places that no tile covers are magenta."""
     node = udim(scene, 1001, 1002, 1012)
+    node.image.pack()  # of files, Cycles loads only the tiles that it takes the mesh to reach, and misses some
     return node.outputs["Color"], node.outputs["Alpha"]
 
 
 @construction
 def packed_tiles(scene: Scene) -> Sockets:
+    """What lies between -1 and 0 belongs to the first tile of its row or column."""
     node = udim(scene, 1001, 1002, 1011, 1012)
     node.image.pack()
     node.extension, node.interpolation = "EXTEND", "Closest"
@@ -635,7 +637,11 @@ def test_mixed_with_transparent(scene: Scene, first: str, varies: bool) -> None:
 
 
 USD = """#usda 1.0
-(defaultPrim = "root" upAxis = "Z")
+(
+  defaultPrim = "root"
+  upAxis = "Z"
+  metersPerUnit = 1
+)
 def Xform "root" {{
   def Mesh "square" (prepend apiSchemas = ["MaterialBindingAPI"]) {{
     int[] faceVertexCounts = [4]
@@ -679,7 +685,7 @@ def Xform "root" {{
   }}
 }}
 """
-SCALE_AND_BIAS = "float4 inputs:scale = (0.5, 0.6, 0.7, 0.9)  float4 inputs:bias = (0.1, 0, 0, 0.05)"
+SCALE_AND_BIAS = "float4 inputs:scale = (0.5, 0.6, 0.7, 0.9)\n      float4 inputs:bias = (0.1, 0, 0, 0.05)"
 OBJ = """mtllib square.mtl
 v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0
 vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1
