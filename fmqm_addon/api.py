@@ -15,6 +15,8 @@ from typing import TypeAlias
 import bpy
 
 from .blender.job import Outcome, measuring
+from .blender.material import Reading
+from .blender.mesh import AS_FOUND
 from .blender.snapshot import target_of
 from .metric.score import COLUMNS, Result
 from .metric.settings import PRESETS, Settings
@@ -33,6 +35,7 @@ def measure(
     repeats: int = 1,
     reference_without_modifiers: bool = False,
     both: bool = False,
+    bake: int = AS_FOUND.bake,
 ) -> list[Outcome]:
     """Scores of objects or collections against a reference.
 
@@ -45,6 +48,7 @@ def measure(
         reference_without_modifiers: the reference is its mesh without modifiers, so that an object can be
             measured against itself.
         both: score the other direction too: `outcome.reverse`, (5,) float64 like the scores.
+        bake: side in pixels of the images onto which materials are baked that cannot be read; 0 forbids it.
 
     Returns:
         One outcome per distorted asset, in their order; `outcome.scores` is (5,) float64 in the order of
@@ -60,5 +64,6 @@ def measure(
         space,
         match_scale,
         both,
+        Reading(bake=bake),
     )
     return stepper.run()

@@ -13,9 +13,11 @@ from ..metric.settings import Settings
 from ..metric.spatial import Floats
 from ..metric.surface import Surface
 from ..metric.trust import Trust
+from .images import TextureCache
+from .material import Reading
 from .measure import Comparison, Measurement
 from .mesh import AS_FOUND
-from .snapshot import Target, fingerprint, take
+from .snapshot import Target, fingerprint, take, to_bake
 from .space import Placed, Placement, place, place_counts
 from .trust import known_facts
 
@@ -79,6 +81,7 @@ def measuring(
     space: str = "auto",
     match_scale: bool = False,
     both: bool = False,
+    reading: Reading = AS_FOUND,
     finished: Callable[[Outcome], None] = lambda _: None,
 ) -> Stepper[list[Outcome]]:
     """A stepper over reading, preparing and comparing.
@@ -90,9 +93,10 @@ def measuring(
         repeats: seeds settings.seed to settings.seed + repeats - 1.
         space, match_scale: as in blender.space.place.
         both: score the other direction too.
+        reading: how the materials are read.
         finished: gets each outcome as soon as it is there.
     """
-    return Stepper(_work(reference, compared, settings, repeats, space, match_scale, both, finished))
+    return Stepper(_work(reference, compared, settings, repeats, space, match_scale, both, reading, finished))
 
 
 def _work(
@@ -103,14 +107,14 @@ def _work(
     space: str,
     match_scale: bool,
     both: bool,
+    reading: Reading,
     finished: Callable[[Outcome], None],
 ) -> Work[list[Outcome]]:
     # Read all, then measure: the user may go on working meanwhile.
-    yield Progress(f"Reading {reference.label}", 0.0)
-    read = [_read(reference)]
-    for index, target in enumerate(compared):
-        yield Progress(f"Reading {target.label}", _READING * (index + 1) / (len(compared) + 1))
-        read.append(_read(target))
+    read = []
+    for index, target in enumerate((reference, *compared)):
+        item = yield from _read(target, reading, _READING * index / (len(compared) + 1))
+        read.append(item)
     share = (1 - _READING) / (len(compared) + 1)
     outcomes: list[Outcome] = []
     original, rest = read[0], read[1:]
@@ -132,7 +136,7 @@ def _work(
             began = _READING + share * (index + 1)
             try:
                 placement = place(original.placed, item.placed, space, match_scale)
-                comparing = measurement.compare(placement.mesh, known_facts(placement, AS_FOUND))
+                comparing = measurement.compare(placement.mesh, known_facts(placement, reading))
                 one = share / 2 if both else share
                 while comparing.step():
                     yield Progress(f"Measuring {item.target.label}", began + one * comparing.progress.done)
@@ -175,11 +179,16 @@ class _Read:
         return self.marks[place_counts(placement.label)]
 
 
-def _read(target: Target) -> _Read:
+def _read(target: Target, reading: Reading, done: float) -> Work[_Read]:
+    yield Progress(f"Reading {target.label}", done)
     began = time.perf_counter()
+    cache = TextureCache()
+    baked = to_bake(target, reading, cache)
+    if baked:
+        yield Progress(f"Reading {target.label}: baking {', '.join(baked)}", done)
     placed, error = None, None
     try:
-        placed = take(target)
+        placed = take(target, reading, cache)
     except FMQMError as reason:
         error = str(reason)
     marks = (fingerprint(target, False), fingerprint(target, True))

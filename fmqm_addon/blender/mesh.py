@@ -32,7 +32,11 @@ _Key = tuple[int, ...]
 
 
 def mesh_arrays(
-    objects: Sequence[bpy.types.Object], name: str, reading: Reading = AS_FOUND, frame: Floats | None = None
+    objects: Sequence[bpy.types.Object],
+    name: str,
+    reading: Reading = AS_FOUND,
+    frame: Floats | None = None,
+    cache: TextureCache | None = None,
 ) -> MeshArrays:
     """The objects and their instances as one mesh: modifiers applied, triangulated, in the world frame.
 
@@ -40,11 +44,12 @@ def mesh_arrays(
         name: what messages call the whole.
         reading: how the materials are read.
         frame: (4, 4) to the world from the frame that positions are wanted in; None is the world's own.
+        cache: of what has been read of this asset's materials already.
 
     Raises:
         MeshError: none of the objects has a face, or a color cannot be read.
     """
-    cache = TextureCache()
+    cache = cache or TextureCache()
     shapes: dict[_Key, _Shape | None] = {}
     places: list[_Place] = []
     particles: Counter[str] = Counter()

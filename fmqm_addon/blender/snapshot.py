@@ -16,7 +16,8 @@ from ..metric.errors import MeshError
 from ..metric.spatial import Floats
 from .assets import SURFACE_TYPES, check_object, collection_members, family_members, instanced, is_measured
 from .evaluate import evaluated
-from .material import Reading
+from .images import TextureCache
+from .material import Reading, Unread, read_look
 from .mesh import AS_FOUND, mesh_arrays
 from .space import Placed
 
@@ -49,11 +50,14 @@ def target_of(block: bpy.types.Object | bpy.types.Collection, bare: bool = False
     return Target(OBJECT if isinstance(block, bpy.types.Object) else COLLECTION, block.name_full, bare)
 
 
-def take(target: Target, reading: Reading = AS_FOUND) -> Placed:
+def take(target: Target, reading: Reading = AS_FOUND, cache: TextureCache | None = None) -> Placed:
     """The asset's arrays, read from Blender; nothing stays behind.
 
     An object is itself with its instances. An empty is what hangs from it and what it instances, a collection is
     what it holds; what is hidden from rendering is left out of either, unless all is.
+
+    Args:
+        reading: how the materials are read. cache: of to_bake, just before.
 
     Raises:
         MeshError: it is gone, of another type, or holds nothing that can be measured.
@@ -62,15 +66,36 @@ def take(target: Target, reading: Reading = AS_FOUND) -> Placed:
     if block is None:
         raise MeshError(f"{target.name}: it is no longer in the file; choose another")
     if isinstance(block, bpy.types.Collection):
-        return placed(collection_members(block), target.label, reading)
+        return placed(collection_members(block), target.label, reading, cache=cache)
     if block.type == "EMPTY":
-        return placed(family_members(block), target.label, reading, origin=block)
+        return placed(family_members(block), target.label, reading, block, cache)
     check_object(block)
     if not block.users_scene:
         raise MeshError(f"{target.name}: it has been deleted from the scene; choose another")
     if target.bare:
-        return _without_modifiers(block, target.label, reading)
-    return placed([block], target.label, reading, origin=block)
+        return _without_modifiers(block, target.label, reading, cache)
+    return placed([block], target.label, reading, block, cache)
+
+
+def to_bake(target: Target, reading: Reading, cache: TextureCache) -> tuple[str, ...]:
+    """Names of the materials that take will bake, which takes a while; what is read meanwhile is in the cache."""
+    if not reading.bake:
+        return ()
+    members = _members(target)
+    materials = {
+        slot.material.name: slot.material
+        for object_ in (*members, *_instances_of(members))
+        for slot in object_.material_slots
+        if slot.material is not None
+    }
+    return tuple(name for name in sorted(materials) if _is_unread(materials[name], reading, cache))
+
+
+def _is_unread(material: bpy.types.Material, reading: Reading, cache: TextureCache) -> bool:
+    try:
+        return isinstance(read_look(material, cache, reading), Unread)
+    except MeshError:  # take says so, if a face has it
+        return False
 
 
 def placed(
@@ -78,6 +103,7 @@ def placed(
     name: str,
     reading: Reading = AS_FOUND,
     origin: bpy.types.Object | None = None,
+    cache: TextureCache | None = None,
 ) -> Placed:
     """Objects as one mesh in the frame of their origin.
 
@@ -94,7 +120,7 @@ def placed(
         roots = {_root(object_).name_full: _root(object_) for object_ in objects}
         origin = next(iter(roots.values())) if len(roots) == 1 else None
     matrix = np.eye(4) if origin is None else _matrix_of(origin)
-    return Placed(mesh_arrays(objects, name, reading, matrix), matrix)
+    return Placed(mesh_arrays(objects, name, reading, matrix, cache), matrix)
 
 
 def contains_surface(block: bpy.types.Object | bpy.types.Collection) -> bool:
@@ -104,14 +130,14 @@ def contains_surface(block: bpy.types.Object | bpy.types.Collection) -> bool:
     return bool(family_members(block)) if block.type == "EMPTY" else is_measured(block)
 
 
-def _without_modifiers(object_: bpy.types.Object, label: str, reading: Reading) -> Placed:
+def _without_modifiers(object_: bpy.types.Object, label: str, reading: Reading, cache: TextureCache | None) -> Placed:
     """By way of a duplicate of the object, on the same mesh."""
     if object_.mode == "EDIT":
         object_.update_from_editmode()
     duplicate = object_.copy()
     try:
         duplicate.modifiers.clear()
-        result = placed([duplicate], label, reading, origin=duplicate)
+        result = placed([duplicate], label, reading, duplicate, cache)
         warnings = tuple(w.replace(duplicate.name, object_.name, 1) for w in result.mesh.warnings)
         return replace(result, mesh=replace(result.mesh, warnings=warnings))
     except MeshError as error:
@@ -138,20 +164,25 @@ def fingerprint(target: Target, place_counts: bool) -> str:
     Original data, not evaluated: cheap, and the same whether the object is hidden. "" if it is gone.
     """
     block = target.find()
-    if block is None:
+    if block is None or (isinstance(block, bpy.types.Object) and not block.users_scene):
         return ""
-    if isinstance(block, bpy.types.Collection):
-        objects = collection_members(block)
-    elif not block.users_scene:
-        return ""
-    else:
-        objects = family_members(block) if block.type == "EMPTY" else [block]
+    objects = _members(target)
     digest = hashlib.blake2b(digest_size=12)
     for object_ in objects:
         _add_object(digest, object_, place_counts, target.bare)
     for object_ in _instances_of(objects):
         _add_object(digest, object_, True, False)
     return digest.hexdigest()
+
+
+def _members(target: Target) -> list[bpy.types.Object]:
+    """The objects that an asset consists of, instances aside."""
+    block = target.find()
+    if block is None:
+        return []
+    if isinstance(block, bpy.types.Collection):
+        return collection_members(block)
+    return family_members(block) if block.type == "EMPTY" else [block]
 
 
 def _instances_of(objects: Sequence[bpy.types.Object]) -> list[bpy.types.Object]:

@@ -15,6 +15,7 @@ from fmqm_addon.blender import bake, mesh
 from fmqm_addon.blender.assets import check_object, metaball_mother, scene_members
 from fmqm_addon.blender.evaluate import evaluated
 from fmqm_addon.blender.files import load_mesh, load_placed
+from fmqm_addon.blender.job import measuring
 from fmqm_addon.blender.material import Reading
 from fmqm_addon.blender.measure import Measurement
 from fmqm_addon.blender.mesh import mesh_arrays
@@ -473,3 +474,24 @@ def test_meshes_that_only_instances_have_are_not_baked() -> None:
     arrays = mesh_arrays([ground], "asset", Reading(bake=64))
     assert {look.name: look.how for look in arrays.materials} == {"Red": "read", "Green": "read", "Veins": "plain"}
     assert any("a mesh that only instances have" in warning for warning in arrays.warnings)
+
+
+def test_the_panel_says_that_it_bakes() -> None:
+    """Before the step that takes a while."""
+    stone = scenes.cube("Stone", materials=[procedural(), scenes.material("Red", (1, 0, 0))])
+    shape = library("Shape")
+    scenes.cube("Pebble", collection=shape, materials=[stone.material_slots[0].material])
+    instances = instancer("Instances", shape)
+    plain = scenes.cube("Plain", materials=[scenes.material("Green", (0, 1, 0))])
+    settings = Settings(samples=400, patches=4)
+    stepper = measuring(target_of(stone), [target_of(instances), target_of(plain)], settings, reading=Reading(bake=32))
+    stages = []
+    while stepper.step():
+        stages.append(stepper.progress.stage)
+    reading = [stage for stage in dict.fromkeys(stages) if stage.startswith("Reading")]
+    assert reading == [
+        "Reading Stone", "Reading Stone: baking Veins",
+        "Reading Instances", "Reading Instances: baking Veins",
+        "Reading Plain",
+    ]  # fmt: skip
+    assert all(outcome.error is None for outcome in stepper.result)
