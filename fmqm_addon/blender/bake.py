@@ -146,7 +146,7 @@ def _scene(like: bpy.types.Scene, temporary: ExitStack) -> bpy.types.Scene:
         scene.render.engine = "CYCLES"
     except TypeError as error:
         raise MeshError("this Blender has no Cycles") from error
-    scene.frame_set(like.frame_current, subframe=like.frame_subframe)
+    scene.frame_current, scene.frame_subframe = like.frame_current, like.frame_subframe
     # The one sample of a pixel lies in its middle.
     scene.cycles.device, scene.cycles.samples, scene.cycles.max_bounces = "CPU", 1, 0
     scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False

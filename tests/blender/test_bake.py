@@ -278,9 +278,11 @@ def test_world_position_under_a_shear() -> None:
 def test_animated_values_are_those_of_the_frame() -> None:
     material = scenes.material()
     tree = material.node_tree
-    leaf = shader(tree, "ShaderNodeBsdfDiffuse", (0.2, 0.2, 0.2))
-    tree.links.new(leaf.outputs[0], surface(material))
-    leaf.inputs["Color"].driver_add("default_value", 0).driver.expression = "frame / 10"
+    color = node(tree, "ShaderNodeRGB").outputs[0]
+    tree.links.new(shader(tree, "ShaderNodeBsdfDiffuse", color).outputs[0], surface(material))
+    for frame, red in ((1, 0.2), (5, 0.5)):
+        color.default_value = (red, 0.2, 0.2, 1)
+        color.keyframe_insert("default_value", frame=frame)
     bpy.context.scene.frame_set(5)
     object_ = scenes.square(materials=[material])
     assert np.abs(look_at(object_, baked(object_, 32)[0]).color - encode_srgb([0.5, 0.2, 0.2])).max() < CLOSE
@@ -402,10 +404,11 @@ def test_images_keep_the_uv_map_that_they_had(tmp_path: Path, overlapping: bool)
     object_ = make(materials=[inverted(scenes.write_png(tmp_path / "image.png", pixels))])
     uv = np.empty(2 * len(object_.data.loops), np.float32)
     object_.data.uv_layers[0].uv.foreach_get("vector", uv)
-    decoy = object_.data.uv_layers.new(name="For editing")
-    decoy.uv.foreach_set("vector", uv[::-1] / 3)
-    object_.data.uv_layers.active = decoy
-    assert not decoy.active_render
+    rendered = object_.data.uv_layers.new(name="For rendering")
+    rendered.uv.foreach_set("vector", uv)
+    rendered.active_render = True
+    object_.data.uv_layers[0].uv.foreach_set("vector", uv[::-1] / 3)
+    object_.data.uv_layers.active_index = 0
     found = baked(object_)[0]
     loops = np.array([face.loops[:] for face in object_.data.loop_triangles])
     own = uv.reshape(-1, 2)[loops]
