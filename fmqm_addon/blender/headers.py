@@ -208,7 +208,8 @@ def _sgi(file: BinaryIO) -> Header:
 def _dpx(file: BinaryIO) -> Header:
     order = ">" if file.read(1) == b"S" else "<"
     width, height = _unpack(order + "II", file, 772)
-    return Header(width, height, True)
+    (depth,) = _unpack("B", file, 803)
+    return Header(width, height, depth > 8)
 
 
 def _cineon(file: BinaryIO) -> Header:

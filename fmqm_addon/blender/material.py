@@ -527,10 +527,15 @@ class _Reader:
             raise _NotReadError(node, "has a mapping of its own")
         if image.source not in {"FILE", "GENERATED", "TILED"}:
             raise _NotReadError(node, f"shows a {image.source.lower()}")
+        known = len(self.layers)
         placement = self._placement(place.input("Vector"))
-        if image.source == "TILED":
-            return self._tiles(node, placement)
-        pixels = self._cache.pixels(image, self._reading.limits)
+        texture = self._tiles(node, placement) if image.source == "TILED" else self._whole(node, placement)
+        if texture is None:
+            del self.layers[known:]
+        return texture
+
+    def _whole(self, node: bpy.types.Node, placement: Placement) -> Texture | None:
+        pixels = self._cache.pixels(node.image, self._reading.limits)
         return None if pixels is None else self._sampler(node, pixels, placement)
 
     def _sampler(self, node: bpy.types.Node, pixels: Pixels, placement: Placement) -> Texture:
