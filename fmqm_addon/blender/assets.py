@@ -43,8 +43,10 @@ def instanced(object_: bpy.types.Object) -> bpy.types.Collection | None:
 
 def collection_members(collection: bpy.types.Collection) -> list[bpy.types.Object]:
     """What a collection that the user names shows, by name; if renders show nothing of it, all there is in it."""
-    visible = visible_objects(collection)
-    return _members(visible) or _members(collection.all_objects)
+    excluded = _excluded(bpy.context.view_layer)
+    if collection.name_full in excluded:  # the whole is named all the same
+        excluded = frozenset()
+    return _members(_visible(collection, excluded)) or _members(collection.all_objects)
 
 
 def family_members(object_: bpy.types.Object) -> list[bpy.types.Object]:
@@ -55,17 +57,16 @@ def family_members(object_: bpy.types.Object) -> list[bpy.types.Object]:
 
 def scene_members() -> list[bpy.types.Object]:
     """What renders show of the active scene, by name."""
-    return _members(visible_objects(bpy.context.view_layer.layer_collection.collection))
+    view_layer = bpy.context.view_layer
+    return _members(_visible(view_layer.layer_collection.collection, _excluded(view_layer)))
 
 
-def visible_objects(collection: bpy.types.Collection) -> list[bpy.types.Object]:
-    """The objects in a collection and below that are not hidden from rendering, themselves or by a collection.
+def _visible(collection: bpy.types.Collection, excluded: frozenset[str] = frozenset()) -> list[bpy.types.Object]:
+    """The objects in a collection and below that neither they nor collections hide from rendering.
 
-    Collections that the view layer excludes are left out too, unless it excludes the whole.
+    Args:
+        excluded: names of collections that are left out. Where a collection is instanced none are.
     """
-    excluded = _excluded(bpy.context.view_layer)
-    if collection.name_full in excluded:
-        excluded = frozenset()
     found: dict[str, bpy.types.Object] = {}
 
     def visit(inner: bpy.types.Collection) -> None:
@@ -88,7 +89,7 @@ def hidden_when_instanced(collection: bpy.types.Collection) -> set[int]:
         if collection.name_full in seen:
             continue
         seen.add(collection.name_full)
-        visible = visible_objects(collection)
+        visible = _visible(collection)
         every.update(object_.as_pointer() for object_ in collection.all_objects)
         shown.update(object_.as_pointer() for object_ in visible)
         waiting += [inner for object_ in visible if (inner := instanced(object_)) is not None]

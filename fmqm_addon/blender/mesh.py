@@ -134,8 +134,9 @@ class _Triangles:
 
 def _key(each: Shown) -> _Key:
     """Equal for what has the same mesh and the same materials."""
+    mesh = each.object.original if each.edited else each.object.data  # edit mode: modifiers are each object's own
     materials = (slot.material for slot in each.object.material_slots)
-    return (each.object.data.as_pointer(), *(0 if found is None else found.as_pointer() for found in materials))
+    return (mesh.as_pointer(), *(0 if found is None else found.as_pointer() for found in materials))
 
 
 def _read_shape(each: Shown, cache: TextureCache, reading: Reading) -> _Shape | None:

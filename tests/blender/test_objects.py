@@ -274,6 +274,24 @@ def test_what_renders_hide_of_an_instanced_collection() -> None:
     assert len(take(target_of(instancer("Top", shape))).mesh.triangles) == 2
 
 
+def test_excluding_a_collection_does_not_hide_its_instances() -> None:
+    shape = collection("Shape")
+    scenes.square("Square", collection=shape)
+    scenes.cube("Cube", collection=collection("Inner", shape))
+    bpy.context.view_layer.layer_collection.children["Shape"].children["Inner"].exclude = True
+    assert len(take(target_of(instancer("Top", shape))).mesh.triangles) == 2 + 12
+    assert len(take(target_of(shape)).mesh.triangles) == 2
+
+
+def test_linked_duplicates_in_edit_mode_have_their_own_modifiers() -> None:
+    first, second = scenes.cube("First"), scenes.cube("Second")
+    second.data = first.data
+    first.modifiers.new("Subdivision", "SUBSURF").levels = 1
+    bpy.context.view_layer.objects.active = first
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert len(mesh_arrays([first, second], "asset").triangles) == 48 + 12
+
+
 def test_what_renders_hide_of_a_collection() -> None:
     top = collection("Top")
     off, excluded = collection("Off", top), collection("Excluded", top)
