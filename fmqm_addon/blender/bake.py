@@ -203,7 +203,7 @@ def _look(
         uv=0 if layout.own else None,
     )
     warning = f"material {material.name}: {unread.node} {unread.why}; baked at {layout.side} x {layout.side}"
-    return Look(made, (Layer("uv", ""),), (warning,))
+    return Look(made, (Layer("uv", ""),), (warning, *unread.warnings))
 
 
 def _encode(colors: NDArray[np.float32], weights: NDArray[np.float32] | None) -> None:

@@ -48,7 +48,7 @@ from ..metric.color import (
 )
 from ..metric.errors import FMQMError, MeshError
 from .headers import DEFAULT_LIMITS, Limits
-from .images import BRIGHTEST, LINEAR_SPACES, Pixels, TextureCache, tile_path, tile_place, why_unread
+from .images import BRIGHTEST, LINEAR_SPACES, Pixels, TextureCache, check_limits, tile_path, tile_place, why_unread
 
 DEFAULT_GREY = 0.8  # linear base color that Blender gives a surface without a material
 MOST_NODES = 200  # of what feeds a base color; read trees are evaluated recursively
@@ -124,11 +124,13 @@ class Look:
 
 @dataclass(frozen=True)
 class Unread:
-    """A material that must be baked: the node that is not read, what about it, and the images that are used."""
+    """A material that must be baked: the node that is not read, what about it (a verb phrase), the images that are
+    used, and what was assumed of them."""
 
     node: str
     why: str
     images: tuple[ImageFacts, ...] = ()
+    warnings: tuple[str, ...] = ()
 
 
 def read_look(material: bpy.types.Material | None, cache: TextureCache, reading: Reading) -> Look | Unread:
@@ -159,7 +161,9 @@ def _read_look(material: bpy.types.Material | None, cache: TextureCache, reading
     try:
         color, alpha = reader.look()
     except _NotReadError as error:
-        return Unread(error.node, error.why, used_images(material, cache))
+        if reading.bake:
+            reader.check_images()
+        return Unread(error.node, error.why, used_images(material, cache), tuple(dict.fromkeys(reader.warnings)))
     uv = next((reader.channel(layer) for layer in reader.layers if layer.kind == "uv"), None)
     made = Material(material.name, color, alpha, "read", used_images(material, cache), uv)
     return Look(made, tuple(reader.layers), tuple(dict.fromkeys(reader.warnings)))
@@ -469,6 +473,21 @@ class _Reader:
         if node.attribute_type != "GEOMETRY":
             raise _NotReadError(node, "reads no attribute of the mesh")
         return VertexColor(self.channel(Layer("color", node.attribute_name))) if node.attribute_name else None
+
+    def check_images(self) -> None:
+        """Of what is to be baked: Cycles would decode images of any size, and show missing ones in magenta, silently.
+
+        Raises:
+            MeshError: as read_look.
+        """
+        self._in_alpha = False
+        for node, role in dict.fromkeys(_upstream(self._surface)):
+            if node.type != "TEX_IMAGE" or role not in _FIRST_ROLES:
+                continue
+            if node.image is not None:
+                check_limits(node.image, self._reading.limits)
+            if role == "base color" and (node.image is None or not node.image.size[0]):
+                self._missing(node)
 
     def _missing(self, node: bpy.types.Node) -> Light:
         """What stands in for an image that is missing or broken."""

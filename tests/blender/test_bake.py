@@ -16,6 +16,7 @@ import pytest
 from fmqm_addon.blender import bake
 from fmqm_addon.blender.bake import Baked, bake_slots
 from fmqm_addon.blender.bvh import BVHQuery
+from fmqm_addon.blender.headers import Limits
 from fmqm_addon.blender.material import Reading, Unread
 from fmqm_addon.blender.mesh import mesh_arrays
 from fmqm_addon.metric.color import Texture, decode_srgb, encode_srgb
@@ -621,3 +622,23 @@ def test_plain_color_where_baking_is_impossible(size: int, monkeypatch: pytest.M
     (warning,) = arrays.warnings
     assert "material Rust: Texture Coordinate is not read" in warning and "plain color" in warning
     assert ("the baker is ill" in warning) is (size > 0)
+
+
+def test_missing_images_are_no_secret_of_the_baker(tmp_path: Path) -> None:
+    path = scenes.write_png(tmp_path / "image.png", scenes.noise(4))
+    object_ = scenes.square(materials=[inverted(path)])
+    path.unlink()
+    with pytest.raises(MeshError, match=r"image\.png: the base-color image is missing"):
+        mesh_arrays([object_], "asset")
+    arrays = mesh_arrays([object_], "asset", Reading(bake=32, stand_in=True))
+    assert any("image.png" in warning and "magenta" in warning for warning in arrays.warnings)
+    assert arrays.materials[0].how == "baked" and [image.missing for image in arrays.materials[0].images] == [True]
+    seen = arrays.materials[0].color.lookup(arrays.corners[0].astype(float))
+    assert np.abs(seen - [0, 1, 0]).max() < CLOSE  # magenta's negative
+    assert mesh_arrays([object_], "asset", Reading(bake=0)).materials[0].how == "plain"
+
+
+def test_huge_images_are_not_decoded_for_the_baker(tmp_path: Path) -> None:
+    object_ = scenes.square(materials=[inverted(scenes.write_png(tmp_path / "image.png", scenes.noise(40)))])
+    with pytest.raises(MeshError, match=r"image\.png: the image promises 40 x 40 pixels, more than 32 a side"):
+        mesh_arrays([object_], "asset", Reading(limits=Limits(side=32)))
