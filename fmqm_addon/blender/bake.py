@@ -108,17 +108,8 @@ def _bake(
         return {}
 
     mesh, uv_map = _triangles(source, parts, temporary)
-    stand_in = bpy.data.objects.new("FMQM bake", mesh)
-    temporary.callback(bpy.data.objects.remove, stand_in)
-    # An object's own location, rotation and scale cannot hold a shear; the inverse of a parent's can.
-    stand_in.parent = bpy.data.objects.new("FMQM bake", None)
-    temporary.callback(bpy.data.objects.remove, stand_in.parent)
-    stand_in.matrix_parent_inverse = object_.matrix_world
-    stand_in.color, stand_in.pass_index = object_.color, object_.pass_index
+    stand_in = _stand_in(object_, mesh, temporary)
     scene.collection.objects.link(stand_in)
-    modeled = object_.original.data
-    if isinstance(modeled, bpy.types.Mesh) and len(modeled.vertices) == len(mesh.vertices):
-        _bend(stand_in, _read(modeled.vertices, "co", 3, np.float32), temporary)
 
     def draw(shine: Shine) -> list[NDArray[np.float32]]:
         for index, part in enumerate(parts):
@@ -146,11 +137,27 @@ def _scene(like: bpy.types.Scene, temporary: ExitStack) -> bpy.types.Scene:
         scene.render.engine = "CYCLES"
     except TypeError as error:
         raise MeshError("this Blender has no Cycles") from error
+    # For image sequences; other animated values are copied as they are.
     scene.frame_current, scene.frame_subframe = like.frame_current, like.frame_subframe
     # The one sample of a pixel lies in its middle.
     scene.cycles.device, scene.cycles.samples, scene.cycles.max_bounces = "CPU", 1, 0
     scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False
     return scene
+
+
+def _stand_in(object_: bpy.types.Object, mesh: bpy.types.Mesh, temporary: ExitStack) -> bpy.types.Object:
+    """An object with another mesh of as many vertices, for shaders like the one it stands for."""
+    made = bpy.data.objects.new("FMQM bake", mesh)
+    temporary.callback(bpy.data.objects.remove, made)
+    # An object's own location, rotation and scale cannot hold a shear; the inverse of a parent's can.
+    made.parent = bpy.data.objects.new("FMQM bake", None)
+    temporary.callback(bpy.data.objects.remove, made.parent)
+    made.matrix_parent_inverse = object_.matrix_world
+    made.color, made.pass_index = object_.color, object_.pass_index
+    modeled = object_.original.data
+    if isinstance(modeled, bpy.types.Mesh) and len(modeled.vertices) == len(mesh.vertices):
+        _bend(made, _read(modeled.vertices, "co", 3, np.float32), temporary)
+    return made
 
 
 def _run(scene: bpy.types.Scene, object_: bpy.types.Object, uv_map: str) -> None:
