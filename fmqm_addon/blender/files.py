@@ -63,7 +63,8 @@ def open_file(path: str) -> None:
     if suffix not in SUFFIXES:
         raise FileError(f"{path}: unknown file ending {suffix or '(none)'}; known: {' '.join(SUFFIXES)}")
     if not os.path.isfile(path):
-        raise FileError(f"{path}: no such file")
+        what = "it is a folder or a device; a file is wanted" if os.path.exists(path) else "no such file"
+        raise FileError(f"{path}: {what}")
     if not os.access(path, os.R_OK):
         raise FileError(f"{path}: permission denied; the file cannot be read")
     if suffix in _CHECKS:
@@ -72,7 +73,9 @@ def open_file(path: str) -> None:
     try:
         _open(os.path.abspath(path), suffix)
     except RuntimeError as error:
-        raise FileError(f"{path}: {_last_line(error)}") from error
+        raise FileError(f"{path}: {_last_line(error)}; check the file, or export it again") from error
+    except UnicodeEncodeError as error:
+        raise FileError(f"{path}: Blender takes only names in UTF-8; rename the file or its folder") from error
 
 
 def split_spec(spec: str) -> tuple[str, str]:
@@ -97,7 +100,7 @@ def _open(path: str, suffix: str) -> None:
         raise FileError(
             f"{path}: this Blender has no importer for {suffix}; convert the file, for example to .glb"
         ) from error
-    result = operator(filepath=path)
+    result = operator(filepath=path, **_OPTIONS.get(suffix, {}))
     if "FINISHED" not in result:
         raise FileError(f"{path}: the importer refused it ({', '.join(result).lower()})")
 
@@ -115,6 +118,8 @@ _IMPORTERS: dict[str, Callable[[], bpy.types.Operator]] = {
     ".usdz": lambda: bpy.ops.wm.usd_import,
     ".abc": lambda: bpy.ops.wm.alembic_import,
 }
+# These importers do not mend meshes unless told to, and Blender would read beyond the ends of their arrays.
+_OPTIONS = dict.fromkeys((".usd", ".usda", ".usdc", ".usdz", ".abc"), {"validate_meshes": True})
 SUFFIXES = (*_IMPORTERS, ".blend")
 _CHECKS = {".abc": check_alembic, ".ply": check_ply}
 
@@ -133,4 +138,8 @@ def _named(name: str, path: str) -> bpy.types.Object:
 def _last_line(error: RuntimeError) -> str:
     """Operators put a report, or a whole traceback, into the error; its last line says what happened."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip() and not line.startswith("Location:")]
-    return lines[-1].removeprefix("Error: ") if lines else "the importer failed without saying why"
+    if not lines:
+        return "the importer failed without saying why"
+    if any(line.endswith("Traceback (most recent call last):") for line in lines):
+        return f"the importer broke off ({lines[-1]})"
+    return lines[-1].removeprefix("Error: ").rstrip(".")

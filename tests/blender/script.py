@@ -22,12 +22,23 @@ STAGES = ("load", "prepare", "fields", "features", "total")
 
 
 def score(
-    *arguments: object, command: tuple[str, ...] = (), env: Mapping[str, str] | None = None, cwd: Path | None = None
+    *arguments: object,
+    command: tuple[str, ...] = (),
+    env: Mapping[str, str] | None = None,
+    cwd: Path | None = None,
+    timeout: float | None = None,
 ) -> subprocess.CompletedProcess[str]:
     """Runs the script; in no case may it end in a traceback."""
     full = [*(command or (sys.executable, str(SCORE))), *(str(argument) for argument in arguments)]
     done = subprocess.run(
-        full, capture_output=True, text=True, encoding="utf-8", env={**os.environ, **(env or {})}, cwd=cwd, check=False
+        full,
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        env={**os.environ, **(env or {})},
+        cwd=cwd,
+        timeout=timeout,
+        check=False,
     )
     assert "Traceback" not in done.stderr and "Traceback" not in done.stdout, done.stderr
     return done
