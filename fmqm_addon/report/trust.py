@@ -14,6 +14,7 @@ Report = dict[str, dict[str, dict[str, Any]]]  # group, fact, "value" and "unit"
 GROUPS = ("reference", "distorted", "pair")
 SHARE = "share"  # what the unit of a share in [0, 1] begins with
 _UNKNOWN = "?"
+_SAID_BY_VALUE = {"yes or no", "number"}  # units that a reader of the value needs not be told
 _APART = {"settings", "images"}  # not in the table: said elsewhere, and in lines of their own
 
 
@@ -81,7 +82,7 @@ def _label(name: str) -> str:
 
 def _unit(item: dict[str, Any]) -> str:
     unit: str = item["why"] if item["value"] is None else item["unit"]
-    return unit.removeprefix(SHARE).strip()
+    return "" if unit in _SAID_BY_VALUE else unit.removeprefix(SHARE).strip()
 
 
 def _is_long(item: dict[str, Any]) -> bool:
