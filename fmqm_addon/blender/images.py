@@ -22,7 +22,7 @@ from .headers import DEFAULT_LIMITS, Header, Limits, file_header, read_header
 LINEAR_SPACES = frozenset({"Non-Color", "Linear Rec.709", "scene_linear"})
 BRIGHTEST = 1e6  # linear light in float images is kept within this, so that nothing made of it overflows
 _LIGHT_FORMATS = frozenset({"OPEN_EXR", "OPEN_EXR_MULTILAYER", "HDR", "DPX", "CINEON"})  # hold linear light
-_BLOCK = 2**24  # floats that are converted at a time
+_BLOCK = 2**18  # floats that are converted at a time: what a processor's cache holds
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,9 @@ def _byte_pixels(image: bpy.types.Image, values: NDArray[np.float32]) -> Pixels:
     result: NDArray[np.uint8] = np.empty((height, width, 4 if has_alpha else 3), np.uint8)
     upwards = result[::-1]
     for rows in _row_blocks(values):
-        block = (values[rows] * 255 + 0.5).astype(np.uint8)
+        values[rows] *= 255
+        values[rows] += 0.5
+        block = values[rows].astype(np.uint8)
         upwards[rows] = block[:, :, : result.shape[2]] if depth >= 3 else block[:, :, :1]
         if associated:  # rounded down, as Cycles does
             color = upwards[rows, :, :3]
