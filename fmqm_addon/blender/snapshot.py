@@ -126,8 +126,8 @@ def placed(
 def contains_surface(block: bpy.types.Object | bpy.types.Collection) -> bool:
     """Whether there is something to measure in an object or collection, faces or not."""
     if isinstance(block, bpy.types.Collection):
-        return bool(collection_members(block))
-    return bool(family_members(block)) if block.type == "EMPTY" else is_measured(block)
+        return any(is_measured(object_) for object_ in block.all_objects)
+    return is_measured(block) or (block.type == "EMPTY" and any(map(is_measured, block.children_recursive)))
 
 
 def _without_modifiers(object_: bpy.types.Object, label: str, reading: Reading, cache: TextureCache | None) -> Placed:
@@ -188,12 +188,15 @@ def _members(target: Target) -> list[bpy.types.Object]:
 def _instances_of(objects: Sequence[bpy.types.Object]) -> list[bpy.types.Object]:
     """The objects of the collections that some instance, and of those that these instance, each once."""
     found: dict[str, bpy.types.Object] = {}
+    seen: set[str] = set()
     waiting = list(objects)
     while waiting:
         collection = instanced(waiting.pop())
-        new = [] if collection is None else [o for o in collection_members(collection) if o.name_full not in found]
-        found.update((object_.name_full, object_) for object_ in new)
-        waiting += new
+        if collection is not None and collection.name_full not in seen:
+            seen.add(collection.name_full)
+            members = collection_members(collection)
+            found.update((member.name_full, member) for member in members)
+            waiting += members
     return [found[name] for name in sorted(found)]
 
 
