@@ -79,7 +79,7 @@ def _visible(collection: bpy.types.Collection, excluded: frozenset[str] = frozen
     return list(found.values())
 
 
-def hidden_when_instanced(collection: bpy.types.Collection) -> set[int]:
+def hidden_when_instanced(collection: bpy.types.Collection) -> frozenset[int]:
     """Addresses of the objects that renders do not show where a collection is instanced, at any depth."""
     shown: set[int] = set()
     every: set[int] = set()
@@ -93,7 +93,7 @@ def hidden_when_instanced(collection: bpy.types.Collection) -> set[int]:
         every.update(object_.as_pointer() for object_ in collection.all_objects)
         shown.update(object_.as_pointer() for object_ in visible)
         waiting += [inner for object_ in visible if (inner := instanced(object_)) is not None]
-    return every - shown
+    return frozenset(every - shown)
 
 
 def metaball_mother(object_: bpy.types.Object) -> bpy.types.Object:

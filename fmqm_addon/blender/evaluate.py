@@ -98,10 +98,10 @@ def shown(objects: Sequence[Evaluated]) -> Iterator[Shown]:
     """
     for depsgraph in dict.fromkeys(each.depsgraph for each in objects):
         owners = {each.object.original.as_pointer(): each for each in objects if each.depsgraph == depsgraph}
+        collections = {address: instanced(each.original) for address, each in owners.items()}
         hidden = {
-            address: hidden_when_instanced(collection)
-            for address, each in owners.items()
-            if (collection := instanced(each.original)) is not None
+            collection: frozenset() if collection is None else hidden_when_instanced(collection)
+            for collection in set(collections.values())
         }
         for entry in depsgraph.object_instances:
             if entry.object.type != "MESH":
@@ -111,7 +111,7 @@ def shown(objects: Sequence[Evaluated]) -> Iterator[Shown]:
             if owner is None:
                 continue
             if entry.is_instance:
-                if entry.object.original.as_pointer() in hidden.get(address, ()):
+                if entry.object.original.as_pointer() in hidden[collections[address]]:
                     continue
             elif entry.object.is_instancer and not entry.object.show_instancer_for_render:
                 continue

@@ -9,7 +9,9 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from mathutils import Matrix, Vector
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mathutils import Euler, Matrix, Vector
 
 from fmqm_addon.blender import bake, mesh
 from fmqm_addon.blender.assets import check_object, metaball_mother, scene_members
@@ -173,6 +175,34 @@ def test_nested_collection_instances(hidden: bool) -> None:
     assert distance.max() < 1e-5
 
 
+NUMBERS = st.floats(-3, 3, width=32)
+FACTORS = st.floats(0.25, 4, width=32) | st.floats(-4, -0.25, width=32)
+TRANSFORMS = st.builds(
+    lambda place, angles, scale: Matrix.LocRotScale(place, Euler(angles), scale),
+    st.tuples(NUMBERS, NUMBERS, NUMBERS),
+    st.tuples(NUMBERS, NUMBERS, NUMBERS),
+    st.tuples(FACTORS, FACTORS, FACTORS),
+)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(TRANSFORMS, min_size=4, max_size=4))
+def test_transforms_of_parents_and_instances_compose(matrices: list[Matrix]) -> None:
+    """Mirrors and shears included: a square under a parent, in a collection, instanced by the child of an empty."""
+    scenes.clear()
+    shape = library("Shape")
+    inside, square = linked(bpy.data.objects.new("Inside", None), shape), scenes.square(collection=shape)
+    top, outside = instancer("Top", shape), linked(bpy.data.objects.new("Outside", None))
+    square.parent, top.parent = inside, outside
+    for object_, matrix in zip((outside, top, inside, square), matrices, strict=True):
+        object_.matrix_basis = matrix
+    exact = np.linalg.multi_dot([np.array(matrix, np.float64) for matrix in matrices])
+    wanted = np.array(scenes.SQUARE) @ exact[:3, :3].T + exact[:3, 3]
+    placed = take(target_of(outside))
+    np.testing.assert_allclose(placed.world().positions, wanted, atol=2e-5 * np.abs(exact).max())
+    np.testing.assert_allclose(placed.origin, np.array(matrices[0]), atol=1e-5)
+
+
 @pytest.mark.parametrize("hidden", [False, True], ids=["visible", "hidden"])
 @pytest.mark.parametrize(("kind", "count"), [("VERTS", 4), ("FACES", 1)])
 def test_children_on_vertices_and_faces(kind: str, count: int, hidden: bool) -> None:
@@ -238,8 +268,8 @@ def test_many_instances_share_what_they_can() -> None:
 def test_particles_are_left_out_and_counted() -> None:
     object_, leaf = scenes.square("Emitter"), scenes.cube("Leaf")
     object_.modifiers.new("Particles", "PARTICLE_SYSTEM")
-    settings = object_.particle_systems[0].settings
-    settings.type, settings.count, settings.render_type, settings.instance_object = "HAIR", 7, "OBJECT", leaf
+    hair = object_.particle_systems[0].settings
+    hair.type, hair.count, hair.render_type, hair.instance_object = "HAIR", 7, "OBJECT", leaf
     arrays = mesh_arrays([object_], "asset")
     assert len(arrays.triangles) == 2
     assert any(warning.startswith("Emitter: 7 particle instances are left out") for warning in arrays.warnings)
@@ -501,8 +531,8 @@ def test_the_panel_says_that_it_bakes() -> None:
     scenes.cube("Pebble", collection=shape, materials=[stone.material_slots[0].material])
     instances = instancer("Instances", shape)
     plain = scenes.cube("Plain", materials=[scenes.material("Green", (0, 1, 0))])
-    settings = Settings(samples=400, patches=4)
-    stepper = measuring(target_of(stone), [target_of(instances), target_of(plain)], settings, reading=Reading(bake=32))
+    few = Settings(samples=400, patches=4)
+    stepper = measuring(target_of(stone), [target_of(instances), target_of(plain)], few, reading=Reading(bake=32))
     stages = []
     while stepper.step():
         stages.append(stepper.progress.stage)
