@@ -7,10 +7,9 @@ baked. Nothing here guesses: what is read is what Cycles shows, which the tests 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from math import isfinite
-from typing import Any, Literal
+from typing import Literal
 
 import bpy
 import numpy as np
@@ -46,9 +45,10 @@ from ..metric.color import (
     Weighted,
     encode_srgb,
 )
-from ..metric.errors import FMQMError, MeshError
+from ..metric.errors import MeshError
 from .headers import DEFAULT_LIMITS, Limits
 from .images import BRIGHTEST, LINEAR_SPACES, Pixels, TextureCache, check_limits, tile_path, tile_place, why_unread
+from .nodes import NotReadError, Place, by_identifier, family, outputs, source, surface_of, upstream, upstream_outputs
 
 DEFAULT_GREY = 0.8  # linear base color that Blender gives a surface without a material
 MOST_NODES = 200  # of what feeds a base color; read trees are evaluated recursively
@@ -77,7 +77,6 @@ _CHANNELS = {"Red": (1.0, 0.0, 0.0), "Green": (0.0, 1.0, 0.0), "Blue": (0.0, 0.0
     "Y": (0.0, 1.0, 0.0),
     "Z": (0.0, 0.0, 1.0),
 }
-_ROLES = {"Base Color": "base color", "Color": "base color", "Alpha": "alpha", "Fac": "alpha", "Factor": "alpha"}
 _FIRST_ROLES = ("base color", "alpha")
 
 
@@ -153,14 +152,14 @@ def _read_look(material: bpy.types.Material | None, cache: TextureCache, reading
     if material is None:
         grey = _plain((DEFAULT_GREY,) * 3)
         return Look(Material("", grey, how="none"), (), ("there is no material; Blender's default grey is taken",))
-    surface = _surface(material)
+    surface = surface_of(material)
     if surface is None:
         why = f"material {material.name} has no shader; its viewport color is taken"
         return plain_look(material, why)
     reader = _Reader(material, surface, cache, reading)
     try:
         color, alpha = reader.look()
-    except _NotReadError as error:
+    except NotReadError as error:
         if reading.bake:
             reader.check_images()
         return Unread(error.node, error.why, used_images(material, cache), tuple(dict.fromkeys(reader.warnings)))
@@ -173,9 +172,9 @@ def plain_look(material: bpy.types.Material, warning: str) -> Look:
     """The plain color of a material that cannot be read where baking is forbidden: that of its shader, which shows
     where nothing is linked to it, else its viewport color."""
     color = material.diffuse_color
-    surface = _surface(material)
+    surface = surface_of(material)
     if surface is not None:
-        shader = next((node for node, _ in _upstream(surface) if node.type == "BSDF_PRINCIPLED"), None)
+        shader = next((node for node, _ in upstream(surface) if node.type == "BSDF_PRINCIPLED"), None)
         color = color if shader is None else shader.inputs["Base Color"].default_value
     return Look(Material(material.name, _plain(color[:3]), how="plain"), (), (warning,))
 
@@ -183,8 +182,8 @@ def plain_look(material: bpy.types.Material, warning: str) -> Look:
 def used_images(material: bpy.types.Material, cache: TextureCache) -> tuple[ImageFacts, ...]:
     """Every image that the material's output depends on, once, by the first role that it plays."""
     roles: dict[bpy.types.Image, str] = {}
-    for start in _outputs(material):
-        for node, role in _upstream(start):
+    for start in outputs(material):
+        for node, role in upstream(start):
             image = getattr(node, "image", None)
             if isinstance(image, bpy.types.Image) and (image not in roles or role in _FIRST_ROLES):
                 roles[image] = min(roles.get(image, role), role, key=_rank)
@@ -206,120 +205,6 @@ def _finite(number: float) -> float:
     return min(max(number, -BRIGHTEST), BRIGHTEST) if isfinite(number) else 0.0
 
 
-# --- The way through a node tree -------------------------------------------------------------------------------------
-
-
-class _NotReadError(FMQMError):
-    """A node that is not read; only used within this module."""
-
-    def __init__(self, node: bpy.types.Node, why: str) -> None:
-        super().__init__(f"{node.name}: {why}")
-        self.node, self.why = node.name, why
-
-
-@dataclass(frozen=True)
-class _Place:
-    """A socket, and the group nodes that lead to its tree."""
-
-    socket: bpy.types.NodeSocket
-    groups: tuple[bpy.types.Node, ...] = ()
-
-    @property
-    def node(self) -> bpy.types.Node:
-        return self.socket.node
-
-    def input(self, name: str | int) -> _Place:
-        """What feeds an input of this place's node, by its name or number."""
-        return _source(_Place(self.node.inputs[name], self.groups))
-
-
-def _outputs(material: bpy.types.Material) -> list[_Place]:
-    """What feeds the active output: its surface and its displacement, where something does."""
-    tree = material.node_tree
-    output = None if tree is None else tree.get_output_node("ALL")
-    if output is None:
-        return []
-    return [_Place(output.inputs[name]) for name in ("Surface", "Displacement") if _link(output.inputs[name])]
-
-
-def _surface(material: bpy.types.Material) -> _Place | None:
-    """The output's surface socket, where something feeds it."""
-    return next((place for place in _outputs(material) if place.socket.name == "Surface"), None)
-
-
-def _link(socket: bpy.types.NodeSocket) -> bpy.types.NodeLink | None:
-    """The link into an input that counts."""
-    return next((link for link in socket.links if link.is_valid and not link.is_muted), None)
-
-
-def _source(place: _Place) -> _Place:
-    """The output that feeds an input, through reroutes, muted nodes and groups; where none does, the input whose own
-    value counts."""
-    family = _family(place.socket)
-    while (link := _link(place.socket)) is not None:
-        output, node = link.from_socket, link.from_node
-        if node.type == "REROUTE":
-            place = _Place(node.inputs[0], place.groups)
-        elif node.mute:
-            through = next((inner.from_socket for inner in node.internal_links if inner.to_socket == output), None)
-            if through is None:
-                raise _NotReadError(node, "is muted and lets nothing through")
-            place = _Place(through, place.groups)
-        elif node.type == "GROUP":
-            place = _Place(_group_result(node, output.identifier), (*place.groups, node))
-        elif node.type == "GROUP_INPUT":
-            place = _Place(_by_identifier(place.groups[-1].inputs, output.identifier, node), place.groups[:-1])
-        else:
-            return _Place(output, place.groups)
-        if _family(place.socket) != family:
-            raise _NotReadError(node, "turns a color into a number or a number into a color")
-    return place
-
-
-def _family(socket: bpy.types.NodeSocket) -> str:
-    return {"RGBA": "VECTOR", "INT": "VALUE", "BOOLEAN": "VALUE"}.get(socket.type, socket.type)
-
-
-def _group_result(node: bpy.types.Node, identifier: str) -> bpy.types.NodeSocket:
-    inner = () if node.node_tree is None else node.node_tree.nodes
-    output = next((each for each in inner if each.type == "GROUP_OUTPUT" and each.is_active_output), None)
-    if output is None:
-        raise _NotReadError(node, "is a group without an output")
-    return _by_identifier(output.inputs, identifier, node)
-
-
-def _by_identifier(sockets: Any, identifier: str, node: bpy.types.Node) -> bpy.types.NodeSocket:
-    found = next((socket for socket in sockets if socket.identifier == identifier), None)
-    if found is None:
-        raise _NotReadError(node, "has lost a socket")
-    return found
-
-
-def _upstream(start: _Place) -> Iterator[tuple[bpy.types.Node, str]]:
-    """Every node that an input depends on, with its role: the name of the shader's input that it feeds."""
-    for place, role in _upstream_outputs(start):
-        yield place.node, role
-
-
-def _upstream_outputs(start: _Place) -> Iterator[tuple[_Place, str]]:
-    """Every output that an input depends on, with its role."""
-    queue, seen = [(start, start.socket.name)], set()
-    while queue:
-        asking, role = queue.pop(0)
-        try:
-            place = _source(asking)
-        except _NotReadError:
-            continue
-        key = (place.socket.as_pointer(), tuple(group.as_pointer() for group in place.groups), role)
-        if not place.socket.is_output or key in seen:
-            continue
-        seen.add(key)
-        yield place, role
-        for socket in place.node.inputs:
-            own = place.socket.type == "SHADER" and socket.type != "SHADER"
-            queue.append((_Place(socket, place.groups), _ROLES.get(socket.name, socket.name) if own else role))
-
-
 # --- What is read ----------------------------------------------------------------------------------------------------
 
 
@@ -331,7 +216,7 @@ class _Transparent:
 class _Reader:
     """Reads one material; collects on the way what it wants of the mesh and what was assumed."""
 
-    def __init__(self, material: bpy.types.Material, surface: _Place, cache: TextureCache, reading: Reading) -> None:
+    def __init__(self, material: bpy.types.Material, surface: Place, cache: TextureCache, reading: Reading) -> None:
         self.layers: list[Layer] = []
         self.warnings: list[str] = []
         self._name = material.name
@@ -340,7 +225,7 @@ class _Reader:
         self._reading = reading
         self._nodes = 0
         self._in_alpha = False
-        used = (place for start in _outputs(material) for place, _ in _upstream_outputs(start))
+        used = (place for start in outputs(material) for place, _ in upstream_outputs(start))
         self._alpha_used = {place.node for place in used if place.socket.name == "Alpha"}
 
     def look(self) -> tuple[Color, Alpha | None]:
@@ -348,9 +233,9 @@ class _Reader:
 
         Raises:
             MeshError: as read_look.
-            _NotReadError: a node is not read.
+            NotReadError: a node is not read.
         """
-        light, value = self._shader(_source(self._surface))
+        light, value = self._shader(source(self._surface))
         if isinstance(light, _Transparent):
             return PlainColor((0.0, 0.0, 0.0)), Opacity(Constant(0.0))
         color: Color
@@ -367,12 +252,12 @@ class _Reader:
             self.layers.append(layer)
         return sum(_WIDTHS[each.kind] for each in self.layers[: self.layers.index(layer)])
 
-    def _shader(self, place: _Place) -> tuple[Light | _Transparent, Value]:
+    def _shader(self, place: Place) -> tuple[Light | _Transparent, Value]:
         """Color and opacity of what a shader output shows."""
         self._count(place)
         kind = place.node.type
         if not place.socket.is_output:
-            raise _NotReadError(place.node, "lacks a shader")
+            raise NotReadError(place.node, "lacks a shader")
         if kind == "BSDF_PRINCIPLED":
             return self._light(place.input("Base Color")), self._opacity(place.input("Alpha"))
         if kind == "BSDF_DIFFUSE":
@@ -384,9 +269,9 @@ class _Reader:
             return _Transparent(), Constant(0.0)
         if kind == "MIX_SHADER":
             return self._mixed_shader(place)
-        raise _NotReadError(place.node, "is a shader that is not read")
+        raise NotReadError(place.node, "is a shader that is not read")
 
-    def _mixed_shader(self, place: _Place) -> tuple[Light | _Transparent, Value]:
+    def _mixed_shader(self, place: Place) -> tuple[Light | _Transparent, Value]:
         factor = self._value(place.input(0))
         if isinstance(factor, Constant) and (factor.number <= 0 or factor.number >= 1):
             return self._shader(place.input(2 if factor.number >= 1 else 1))
@@ -396,27 +281,27 @@ class _Reader:
             return second, _product(share, second_alpha)
         if isinstance(second, _Transparent):
             return first, _product(Arithmetic("subtract", Constant(1.0), share), first_alpha)
-        raise _NotReadError(place.node, "mixes two shaders")
+        raise NotReadError(place.node, "mixes two shaders")
 
-    def _opacity(self, place: _Place) -> Value:
+    def _opacity(self, place: Place) -> Value:
         """The value at Alpha; opaque, with a warning, where it is not read."""
         known = len(self.layers)
         self._in_alpha = True
         try:
             return self._value(place)
-        except _NotReadError as error:
+        except NotReadError as error:
             del self.layers[known:]
             self.warnings.append(f"material {self._name}: its Alpha depends on {error}; it counts as opaque")
             return Constant(1.0)
         finally:
             self._in_alpha = False
 
-    def _count(self, place: _Place) -> None:
+    def _count(self, place: Place) -> None:
         self._nodes += 1
         if self._nodes > MOST_NODES:
-            raise _NotReadError(place.node, "ends a tree of too many nodes")
+            raise NotReadError(place.node, "ends a tree of too many nodes")
 
-    def _light(self, place: _Place) -> Light:
+    def _light(self, place: Place) -> Light:
         """The color at an input: of the output that feeds it, or its own."""
         self._count(place)
         node, socket = place.node, place.socket
@@ -424,7 +309,7 @@ class _Reader:
             value = socket.default_value
             rgb = (value,) * 3 if socket.type == "VALUE" else tuple(value)[:3]
             return PlainLight((_finite(rgb[0]), _finite(rgb[1]), _finite(rgb[2])))
-        if _family(socket) == "VALUE":
+        if family(socket) == "VALUE":
             number = self._value(place)
             return PlainLight((number.number,) * 3) if isinstance(number, Constant) else Grey(number)
         if node.type == "TEX_IMAGE":
@@ -438,13 +323,13 @@ class _Reader:
             return self._mix(place, ("Fac", "Color1", "Color2"), True, node.use_clamp)
         if node.type == "VECT_MATH" and node.operation in {"MULTIPLY", "ADD", "MULTIPLY_ADD"}:
             return self._vector_math(place)
-        raise _NotReadError(node, "is not read")
+        raise NotReadError(node, "is not read")
 
-    def _mix(self, place: _Place, names: tuple[str, str, str], clamp_factor: bool, clamp: bool) -> Light:
+    def _mix(self, place: Place, names: tuple[str, str, str], clamp_factor: bool, clamp: bool) -> Light:
         node = place.node
         if node.blend_type not in {"MIX", "MULTIPLY"}:
-            raise _NotReadError(node, f"blends by {node.blend_type.replace('_', ' ').lower()}")
-        inputs = [_source(_Place(_by_identifier(node.inputs, name, node), place.groups)) for name in names]
+            raise NotReadError(node, f"blends by {node.blend_type.replace('_', ' ').lower()}")
+        inputs = [source(Place(by_identifier(node.inputs, name, node), place.groups)) for name in names]
         factor = self._number(inputs[0], node, "factor")
         if clamp_factor:
             factor = min(max(factor, 0.0), 1.0)
@@ -453,14 +338,14 @@ class _Reader:
         plain = isinstance(first, PlainLight) and isinstance(second, PlainLight)
         return _evaluated(mixed) if plain else mixed
 
-    def _vector_math(self, place: _Place) -> Light:
+    def _vector_math(self, place: Place) -> Light:
         node = place.node
         lights = [self._light(place.input(number)) for number in range(3 if node.operation == "MULTIPLY_ADD" else 2)]
         if node.operation in {"MULTIPLY", "ADD"} and isinstance(lights[0], PlainLight):
             lights.reverse()
         constants = [light.rgb for light in lights[1:] if isinstance(light, PlainLight)]
         if len(constants) < len(lights) - 1:
-            raise _NotReadError(node, "combines two colors that vary")
+            raise NotReadError(node, "combines two colors that vary")
         ones, zeros = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
         scale = ones if node.operation == "ADD" else constants[0]
         bias = zeros if node.operation == "MULTIPLY" else constants[-1]
@@ -471,7 +356,7 @@ class _Reader:
         if node.type == "VERTEX_COLOR":
             return VertexColor(self.channel(Layer("color", node.layer_name)))
         if node.attribute_type != "GEOMETRY":
-            raise _NotReadError(node, "reads no attribute of the mesh")
+            raise NotReadError(node, "reads no attribute of the mesh")
         return VertexColor(self.channel(Layer("color", node.attribute_name))) if node.attribute_name else None
 
     def check_images(self) -> None:
@@ -481,7 +366,7 @@ class _Reader:
             MeshError: as read_look.
         """
         self._in_alpha = False
-        for node, role in dict.fromkeys(_upstream(self._surface)):
+        for node, role in dict.fromkeys(upstream(self._surface)):
             if node.type != "TEX_IMAGE" or role not in _FIRST_ROLES:
                 continue
             if node.image is not None:
@@ -502,11 +387,11 @@ class _Reader:
         self.warnings.append(f"{what}; magenta stands in for it")
         return PlainLight(MISSING)
 
-    def _value(self, place: _Place) -> Value:
+    def _value(self, place: Place) -> Value:
         """The number at an input: of the output that feeds it, or its own."""
         self._count(place)
         node, socket = place.node, place.socket
-        if _family(socket) != "VALUE":
+        if family(socket) != "VALUE":
             return _weighted(self._light(place), _AVERAGE if socket.type == "VECTOR" else _LUMINANCE)
         if not socket.is_output or node.type == "VALUE":
             return Constant(_finite(float(socket.default_value)))
@@ -526,26 +411,26 @@ class _Reader:
         if node.type == "MATH" and node.operation == "MULTIPLY_ADD":
             first, second, third = (self._value(place.input(number)) for number in range(3))
             return _arithmetic("add", _arithmetic("multiply", first, second), third, node.use_clamp)
-        raise _NotReadError(node, "is not read")
+        raise NotReadError(node, "is not read")
 
-    def _number(self, place: _Place, node: bpy.types.Node, what: str) -> float:
+    def _number(self, place: Place, node: bpy.types.Node, what: str) -> float:
         value = self._value(place)
         if not isinstance(value, Constant):
-            raise _NotReadError(node, f"has a {what} that varies")
+            raise NotReadError(node, f"has a {what} that varies")
         return value.number
 
-    def _texture(self, place: _Place) -> Texture | Tiles | None:
+    def _texture(self, place: Place) -> Texture | Tiles | None:
         """The texture of an image node; None where its image is missing."""
         node = place.node
         image = node.image
         if image is None:
             return None
         if node.projection != "FLAT":
-            raise _NotReadError(node, f"has the projection {node.projection.lower()}")
+            raise NotReadError(node, f"has the projection {node.projection.lower()}")
         if _is_mapped(node.texture_mapping):
-            raise _NotReadError(node, "has a mapping of its own")
+            raise NotReadError(node, "has a mapping of its own")
         if image.source not in {"FILE", "GENERATED", "TILED"}:
-            raise _NotReadError(node, f"shows a {image.source.lower()}")
+            raise NotReadError(node, f"shows a {image.source.lower()}")
         known = len(self.layers)
         placement = self._placement(place.input("Vector"))
         texture = self._tiles(node, placement) if image.source == "TILED" else self._whole(node, placement)
@@ -559,9 +444,9 @@ class _Reader:
 
     def _sampler(self, node: bpy.types.Node, pixels: Pixels, placement: Placement) -> Texture:
         if pixels.values.dtype == np.uint8 and node.image.colorspace_settings.name not in LINEAR_SPACES | {"sRGB"}:
-            raise _NotReadError(node, f"has an image in the color space {node.image.colorspace_settings.name}")
+            raise NotReadError(node, f"has an image in the color space {node.image.colorspace_settings.name}")
         if pixels.unusual:
-            raise _NotReadError(node, "has an image that stores its alpha in an unusual way")
+            raise NotReadError(node, "has an image that stores its alpha in an unusual way")
         return Texture(
             pixels.values,
             extension=_EXTENSIONS[node.extension],
@@ -574,7 +459,7 @@ class _Reader:
     def _tiles(self, node: bpy.types.Node, placement: Placement) -> Tiles | None:
         image = node.image
         if image.is_dirty:
-            raise _NotReadError(node, "has tiles with unsaved changes")
+            raise NotReadError(node, "has tiles with unsaved changes")
         tiles, missing = [], []
         for tile in image.tiles:
             pixels = self._cache.tile(image, tile.number, self._reading.limits)
@@ -590,7 +475,7 @@ class _Reader:
             ]
         return Tiles(tuple(tiles), placement) if tiles else None
 
-    def _placement(self, place: _Place) -> Placement:
+    def _placement(self, place: Place) -> Placement:
         """Where the vector at an input lies on an image."""
         node, socket = place.node, place.socket
         fold: tuple[Fold, Fold] = ("none", "none")
@@ -604,41 +489,41 @@ class _Reader:
             affine = ((a, b, c), (d, e, f))
         return Placement(self.channel(Layer("uv", name)), affine, fold)
 
-    def _folded(self, place: _Place) -> tuple[tuple[Fold, Fold], _Place]:
+    def _folded(self, place: Place) -> tuple[tuple[Fold, Fold], Place]:
         """What is done to u and v apart, as the glTF importer does for unlike wrap modes; and the vector that they
         are taken from."""
         folds: list[Fold] = []
         vectors = set()
         for number, axis in enumerate("XY"):
-            source = place.input(number)
+            taken = place.input(number)
             fold: Fold = "none"
-            if source.node.type == "MATH":
-                fold = self._fold_of(source)
-                source = source.input(0)
-            if source.node.type != "SEPXYZ" or source.socket.name != axis:
-                raise _NotReadError(place.node, "combines a vector of more than wrapped u and v")
+            if taken.node.type == "MATH":
+                fold = self._fold_of(taken)
+                taken = taken.input(0)
+            if taken.node.type != "SEPXYZ" or taken.socket.name != axis:
+                raise NotReadError(place.node, "combines a vector of more than wrapped u and v")
             folds.append(fold)
-            vectors.add(source.input(0))
+            vectors.add(taken.input(0))
         if len(vectors) > 1:
-            raise _NotReadError(place.node, "combines two vectors")
+            raise NotReadError(place.node, "combines two vectors")
         return (folds[0], folds[1]), vectors.pop()
 
-    def _fold_of(self, place: _Place) -> Fold:
+    def _fold_of(self, place: Place) -> Fold:
         node = place.node
         limits = [self._number(place.input(number), node, "limit") for number in (1, 2)]
         if node.operation == "WRAP" and sorted(limits) == [0, 1]:
             return "wrap"
         if node.operation == "PINGPONG" and limits[0] == 1:
             return "pingpong"
-        raise _NotReadError(node, "is not read")
+        raise NotReadError(node, "is not read")
 
-    def _uv(self, place: _Place) -> tuple[str, Matrix]:
+    def _uv(self, place: Place) -> tuple[str, Matrix]:
         """The UV map that a vector is taken from, and the (4, 4) matrix that leads from (u, v, 0, 1) to it."""
         self._count(place)
         node, socket = place.node, place.socket
         if not socket.is_output:
             if node.type != "TEX_IMAGE":  # the socket of a group or a mapping: a constant vector
-                raise _NotReadError(node, "has no vector")
+                raise NotReadError(node, "has no vector")
             return "", Matrix.Identity(4)
         if node.type == "TEX_COORD" and socket.name == "UV" and not node.from_instancer:
             return "", Matrix.Identity(4)
@@ -649,9 +534,9 @@ class _Reader:
         if node.type == "MAPPING":
             name, before = self._uv(place.input("Vector"))
             return name, self._mapping(place) @ before
-        raise _NotReadError(node, "is not read as the vector of an image")
+        raise NotReadError(node, "is not read as the vector of an image")
 
-    def _mapping(self, place: _Place) -> Matrix:
+    def _mapping(self, place: Place) -> Matrix:
         node = place.node
         scale, rotation = (self._vector(place.input(name), node) for name in ("Scale", "Rotation"))
         turned = Euler(rotation, "XYZ").to_matrix().to_4x4()
@@ -665,12 +550,12 @@ class _Reader:
             back = Matrix.Diagonal((*(1 / x if x else 0.0 for x in scale), 1.0))  # as Blender divides by 0
             moved = Matrix.Translation([-x for x in self._vector(place.input("Location"), node)])
             return back @ turned.transposed() @ moved
-        raise _NotReadError(node, f"maps as {node.vector_type.lower()}")
+        raise NotReadError(node, f"maps as {node.vector_type.lower()}")
 
-    def _vector(self, place: _Place, node: bpy.types.Node) -> tuple[float, float, float]:
+    def _vector(self, place: Place, node: bpy.types.Node) -> tuple[float, float, float]:
         light = self._light(place)
         if not isinstance(light, PlainLight):
-            raise _NotReadError(node, "has an input that varies")
+            raise NotReadError(node, "has an input that varies")
         return light.rgb
 
 
