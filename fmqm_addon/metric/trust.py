@@ -424,7 +424,7 @@ def _warnings(
                 f"{name}: {_percent(missing)} of its textured area has no texture coordinates (all are 0, 0) and the "
                 "color of one pixel; unwrap it"
             )
-    return tuple(warnings)
+    return tuple(dict.fromkeys(warnings))  # a mesh may be compared with itself
 
 
 def _percent(share: float) -> str:

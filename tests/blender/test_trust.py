@@ -7,6 +7,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -101,6 +102,22 @@ def test_floating_junk_is_a_warning_and_the_other_direction_sees_it(pair: list[b
     assert alone.reverse is None
 
 
+class Layout:
+    """Writes down what a panel says, in the place of Blender's own."""
+
+    def __init__(self) -> None:
+        self.said: list[str] = []
+
+    def column(self, align: bool) -> Layout:
+        return self
+
+    def split(self, factor: float, align: bool) -> Layout:
+        return self
+
+    def label(self, text: str, translate: bool = True) -> None:
+        self.said.append(text)
+
+
 def test_rows_keep_the_report_and_the_other_direction(pair: list[bpy.types.Object]) -> None:
     fmqm_addon.register()
     try:
@@ -117,6 +134,11 @@ def test_rows_keep_the_report_and_the_other_direction(pair: list[bpy.types.Objec
         assert row_trust(row) == json.loads(json.dumps(trust_dict(outcome.trust)))
         assert row_reverse(row) == dict(zip(COLUMNS, outcome.reverse, strict=True))
         kept = pair_of(row)
+        layout = Layout()
+        panels.FMQM_PT_trust.draw(SimpleNamespace(layout=layout), bpy.context)
+        said = dict(zip(layout.said[::2], layout.said[1::2], strict=True))
+        assert said["Watertight"] == "no" and said["Triangles"] == "968 / 980" and said["Flipped"] == "0 %"
+        assert said["Base color, distorted"].endswith(", 32 x 32, sRGB")
         assert kept.trust == row_trust(row) and np.array_equal(kept.reverse, outcome.reverse)
     finally:
         fmqm_addon.unregister()
