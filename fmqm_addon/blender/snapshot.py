@@ -260,7 +260,9 @@ def _add_material(digest: Any, material: bpy.types.Material | None) -> None:
         digest.update(repr(names).encode())
 
 
-_NOT_A_VALUE = {"location", "location_absolute", "width", "height", "select", "is_active", "dimensions"}
+_NOT_A_VALUE = {
+    "rna_type", "original", "location", "location_absolute", "width", "height", "select", "is_active", "dimensions",
+}  # fmt: skip
 _VALUES = {"BOOLEAN", "INT", "FLOAT", "STRING", "ENUM"}
 
 

@@ -126,11 +126,33 @@ def test_metaballs_belong_to_their_mother() -> None:
     assert scene_members() == [mother]
 
 
-def test_an_edited_metaball_is_noticed() -> None:
-    target = target_of(balls())
-    before = fingerprint(target, False)
-    bpy.data.objects["Ball"].data.elements[0].radius = 3.0
-    assert fingerprint(target, False) != before
+EDITS: dict[Callable[[], bpy.types.Object], Callable[[bpy.types.ID], None]] = {
+    tube: lambda data: setattr(data.splines[0].bezier_points[0], "co", (1, 2, 3)),
+    text: lambda data: setattr(data, "body", "Other"),
+    patch: lambda data: setattr(data.splines[0].points[0], "co", (1, 2, 3, 1)),
+    balls: lambda data: setattr(data.elements[0], "radius", 3.0),
+}
+
+
+@pytest.mark.parametrize("make", KINDS, ids=lambda make: make.__name__)
+def test_edits_are_noticed(make: Callable[[], bpy.types.Object]) -> None:
+    object_ = make()
+    bpy.context.view_layer.update()
+    before = fingerprint(target_of(object_), False)
+    assert fingerprint(target_of(object_), False) == before
+    object_.location.x += 1
+    bpy.context.view_layer.update()
+    assert fingerprint(target_of(object_), False) == before
+    assert fingerprint(target_of(object_), True) != before
+    EDITS[make](object_.data)
+    assert fingerprint(target_of(object_), False) != before
+
+
+@pytest.mark.parametrize("make", KINDS, ids=lambda make: make.__name__)
+def test_kinds_score_1_against_themselves(make: Callable[[], bpy.types.Object]) -> None:
+    object_ = make()
+    (outcome,) = measuring(target_of(object_), [target_of(object_)], Settings(samples=800, patches=8)).run()
+    assert outcome.error is None and outcome.scores.tolist() == [1.0] * 5
 
 
 @pytest.mark.parametrize("kind", ["CAMERA", "ARMATURE", "LIGHT"])
