@@ -6,6 +6,7 @@ from __future__ import annotations
 import hashlib
 import io
 import os
+import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -43,6 +44,10 @@ class Pixels:
     unusual: bool
 
 
+# Pixels that were read and that some asset may still hold, by content and by how Blender reads it.
+_held: dict[tuple[str, str, str, bool], tuple[weakref.ref[NDArray[Any]], tuple[bool, bool, bool]]] = {}
+
+
 class TextureCache:
     """What was read of an asset's images and materials: once for all its slots and objects."""
 
@@ -52,8 +57,8 @@ class TextureCache:
         self.looks: dict[int, Any] = {}  # by material.read_look alone
 
     def pixels(self, image: bpy.types.Image, limits: Limits) -> Pixels | None:
-        """As read_pixels."""
-        return self._once((image.as_pointer(), 0), lambda: read_pixels(image, limits))
+        """As read_pixels; what another asset still holds of the same content is shared."""
+        return self._once((image.as_pointer(), 0), lambda: self._shared(image, limits))
 
     def tile(self, image: bpy.types.Image, number: int, limits: Limits) -> Pixels | None:
         """As read_tile."""
@@ -61,10 +66,29 @@ class TextureCache:
 
     def facts(self, image: bpy.types.Image, role: str) -> ImageFacts:
         """As image_facts, with the content looked through once."""
+        return image_facts(image, role, self._digest(image))
+
+    def _digest(self, image: bpy.types.Image) -> str:
         key = image.as_pointer()
         if key not in self._digests:
             self._digests[key] = image_digest(image)
-        return image_facts(image, role, self._digests[key])
+        return self._digests[key]
+
+    def _shared(self, image: bpy.types.Image, limits: Limits) -> Pixels | None:
+        """LODs mostly carry the reference's own images: decoding and keeping them again would cost twice."""
+        if image.source != "FILE" or image.is_dirty or not self._digest(image):
+            return read_pixels(image, limits)
+        space, packed = image.colorspace_settings.name, image.packed_file is not None
+        key = (self._digest(image), space, image.alpha_mode, packed)
+        held = _held.get(key)
+        values = None if held is None else held[0]()
+        if held is not None and values is not None:
+            check_limits(image, limits)
+            return Pixels(values, *held[1])
+        pixels = read_pixels(image, limits)
+        if pixels is not None:
+            _held[key] = weakref.ref(pixels.values), (pixels.linear, pixels.associated, pixels.unusual)
+        return pixels
 
     def _once(self, key: tuple[int, int], read: Callable[[], Pixels | None]) -> Pixels | None:
         if key not in self._pixels:

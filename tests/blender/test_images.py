@@ -119,6 +119,28 @@ def test_only_what_was_decoded_for_this_is_given_back(tmp_path: Path) -> None:
     assert not np.array(image.pixels)[:3].any()
 
 
+def test_the_same_content_is_kept_once_for_all_assets(tmp_path: Path) -> None:
+    """As long as somebody holds it; read in another way, it is something else."""
+    path = scenes.write_png(tmp_path / "image.png", scenes.noise())
+    copy = tmp_path / "copy.png"
+    copy.write_bytes(path.read_bytes())
+    limits = Limits()
+    first = TextureCache().pixels(bpy.data.images.load(str(path)), limits)
+    image = bpy.data.images.load(str(copy))
+    second = TextureCache().pixels(image, limits)
+    assert first is not None and second is not None and second.values is first.values and not image.has_data
+    image.colorspace_settings.name = "Non-Color"
+    linear = TextureCache().pixels(image, limits)
+    assert linear is not None and linear.linear and not second.linear
+    with pytest.raises(MeshError):
+        TextureCache().pixels(bpy.data.images.load(str(path)), Limits(side=8))
+    del first, second, linear
+    copy.write_bytes(scenes.write_png(path, scenes.noise(seed=1)).read_bytes())
+    image.reload()
+    changed = TextureCache().pixels(image, limits)
+    assert changed is not None and np.array_equal(changed.values, scenes.noise(seed=1))
+
+
 def test_digest_is_of_the_content(tmp_path: Path) -> None:
     one, other = loaded(tmp_path, scenes.noise(), "a.png"), loaded(tmp_path, scenes.noise(), "b.png")
     assert image_digest(one) == image_digest(other) != ""
