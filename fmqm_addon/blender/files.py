@@ -6,6 +6,8 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable
+from contextlib import redirect_stderr
+from io import StringIO
 from pathlib import Path
 
 import bpy
@@ -71,7 +73,8 @@ def open_file(path: str) -> None:
         _CHECKS[suffix](path)
     _clear_session()
     try:
-        _open(os.path.abspath(path), suffix)
+        with redirect_stderr(StringIO()):  # Blender prints the tracebacks of importers written in Python
+            _open(os.path.abspath(path), suffix)
     except RuntimeError as error:
         raise FileError(f"{path}: {_last_line(error)}; check the file, or export it again") from error
     except UnicodeEncodeError as error:

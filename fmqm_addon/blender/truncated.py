@@ -51,7 +51,7 @@ def check_ply(path: str) -> None:
     with open(path, "rb") as file:
         data = file.read()
     header, _, _ = data.partition(b"end_header")
-    if header.find(b"\nproperty") < header.find(b"\nelement"):
+    if data.startswith(b"ply") and b"\nproperty" in header.partition(b"\nelement")[0]:
         raise FileError(f"{path}: the PLY header lists properties of no element; export the file again")
     for line in header.splitlines():
         words = line.split()

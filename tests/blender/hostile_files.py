@@ -97,7 +97,7 @@ PLY: dict[str, tuple[bytes, Outcome]] = {
     "more_faces_promised": (ply(3, 2_000_000_000, CORNERS + "3 0 1 2\n"), "the PLY header"),
     "more_than_2_to_the_31": (ply(9_999_999_999, 1, CORNERS + "3 0 1 2\n"), "the PLY header"),
     "more_than_2_to_the_64": (ply(10**25, 1, CORNERS + "3 0 1 2\n"), "the PLY header"),
-    "binary_promises": (ply(2_000_000_000, 1, "", "binary_little_endian 1.0") + b"x" * 50, "truncated"),
+    "binary_promises": (ply(2_000_000_000, 1, "", "binary_little_endian 1.0") + b"x" * 50, "the PLY header"),
     "count_negative": (ply(-3, -1, CORNERS + "3 0 1 2\n"), "no vertices"),
     "count_not_a_number": (ply("three", "one", CORNERS + "3 0 1 2\n"), "the PLY header"),
     "no_faces": (ply(3, 0, CORNERS), "no faces"),
