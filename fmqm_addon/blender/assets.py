@@ -18,8 +18,13 @@ _NOT_EXPORTED = "glTF_not_exported"  # where the glTF importer puts what it made
 
 
 def is_measured(object_: bpy.types.Object) -> bool:
-    """Whether an object may show a surface: its own, or that of the collection it instances. Cheap."""
-    return object_.type in SURFACE_TYPES or instanced(object_) is not None
+    """Whether an object may show a surface: its own, that of the collection it instances, or what its Geometry Nodes
+    make of it, as point clouds from USD files have them. Cheap."""
+    return (
+        object_.type in SURFACE_TYPES
+        or instanced(object_) is not None
+        or any(modifier.type == "NODES" for modifier in object_.modifiers)
+    )
 
 
 def check_object(object_: bpy.types.Object) -> None:
@@ -61,18 +66,24 @@ def scene_members() -> list[bpy.types.Object]:
     return _members(_visible(view_layer.layer_collection.collection, _excluded(view_layer)))
 
 
-def _visible(collection: bpy.types.Collection, excluded: frozenset[str] = frozenset()) -> list[bpy.types.Object]:
+def _visible(
+    collection: bpy.types.Collection, excluded: frozenset[str] = frozenset(), viewports: bool = False
+) -> list[bpy.types.Object]:
     """The objects in a collection and below that neither they nor collections hide from rendering.
 
     Args:
         excluded: names of collections that are left out. Where a collection is instanced none are.
+        viewports: nor from viewports.
     """
     found: dict[str, bpy.types.Object] = {}
 
+    def is_hidden(block: bpy.types.Object | bpy.types.Collection) -> bool:
+        return block.hide_render or (viewports and block.hide_viewport)
+
     def visit(inner: bpy.types.Collection) -> None:
-        found.update((object_.name_full, object_) for object_ in inner.objects if not object_.hide_render)
+        found.update((object_.name_full, object_) for object_ in inner.objects if not is_hidden(object_))
         for child in inner.children:
-            if not child.hide_render and child.name_full not in excluded:
+            if not is_hidden(child) and child.name_full not in excluded:
                 visit(child)
 
     visit(collection)
@@ -83,17 +94,30 @@ def hidden_when_instanced(collection: bpy.types.Collection) -> frozenset[int]:
     """Addresses of the objects that renders do not show where a collection is instanced, at any depth."""
     shown: set[int] = set()
     every: set[int] = set()
-    waiting, seen = [collection], set()
-    while waiting:
-        collection = waiting.pop()
-        if collection.name_full in seen:
-            continue
-        seen.add(collection.name_full)
-        visible = _visible(collection)
-        every.update(object_.as_pointer() for object_ in collection.all_objects)
-        shown.update(object_.as_pointer() for object_ in visible)
-        waiting += [inner for object_ in visible if (inner := instanced(object_)) is not None]
+    for inner in _with_nested(collection):
+        every.update(object_.as_pointer() for object_ in inner.all_objects)
+        shown.update(object_.as_pointer() for object_ in _visible(inner))
     return frozenset(every - shown)
+
+
+def disabled_when_instanced(collection: bpy.types.Collection) -> int:
+    """How many objects renders show where a collection is instanced, at any depth, and viewports do not: Blender
+    lists to Python only the instances that viewports show."""
+    rendered: set[int] = set()
+    listed: set[int] = set()
+    for inner in _with_nested(collection):
+        rendered.update(each.as_pointer() for each in _visible(inner) if is_measured(each))
+        listed.update(each.as_pointer() for each in _visible(inner, viewports=True))
+    return len(rendered - listed)
+
+
+def _with_nested(collection: bpy.types.Collection) -> list[bpy.types.Collection]:
+    """The collection and those that instances show of it, at any depth, each once."""
+    found = [collection]
+    for each in found:  # which grows
+        nested = (instanced(object_) for object_ in _visible(each))
+        found += dict.fromkeys(inner for inner in nested if inner is not None and inner not in found)
+    return found
 
 
 def metaball_mother(object_: bpy.types.Object) -> bpy.types.Object:

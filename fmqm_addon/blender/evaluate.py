@@ -41,11 +41,14 @@ class Shown:
     particle: bool
 
     @property
+    def made(self) -> bool:
+        """An instance of a mesh that is no object's own: modifiers made it, or the owner is no mesh."""
+        return self.instance and self.object.original == self.owner.object.original
+
+    @property
     def edited(self) -> bool:
         """In edit mode, as a mesh of its own."""
-        original = self.object.original
-        made = self.instance and original == self.owner.object.original
-        return self.object.mode == "EDIT" and original.type == "MESH" and not made
+        return self.object.mode == "EDIT" and self.object.original.type == "MESH" and not self.made
 
     @property
     def name(self) -> str:

@@ -4,20 +4,23 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 from numpy.typing import NDArray
 
 from ..metric.color import Encoded, Material, VertexColor
-from ..metric.errors import MeshError
+from ..metric.errors import MeshError, one_line
 from ..metric.spatial import Floats
 from ..metric.surface import MeshArrays, join_meshes
+from .assets import disabled_when_instanced, instanced
 from .bake import Baked, bake_slots
-from .evaluate import Shown, evaluated, shown
+from .evaluate import Evaluated, Shown, evaluated, shown
 from .images import TextureCache
 from .material import Layer, Look, Reading, Unread, plain_look, read_look
 
@@ -53,7 +56,7 @@ def mesh_arrays(
     shapes: dict[_Key, _Shape | None] = {}
     places: list[_Place] = []
     particles: Counter[str] = Counter()
-    with evaluated(objects) as found:
+    with evaluated(objects) as found, ExitStack() as temporary:
         order = {each.original.as_pointer(): index for index, each in enumerate(found)}
         for each in shown(found):
             if each.particle:
@@ -61,23 +64,35 @@ def mesh_arrays(
                 continue
             key = _key(each)
             if key not in shapes:
-                shapes[key] = _read_shape(each, cache, reading)
+                shapes[key] = _read_shape(each, cache, reading, temporary)
             if shapes[key] is not None:
                 matrix = _relative(each.matrix, frame, each.name)
                 places.append(_Place(order[each.owner.original.as_pointer()], each.name, matrix, key))
+        remarks = _left_out(found)
         parts = {key: _as_arrays(shape, reading) for key, shape in shapes.items() if shape is not None}
     if not places:
         what = "the mesh has no faces" if objects else "no mesh in it"
         raise MeshError(f"{name}: {what}; a surface is wanted")
     # Blender lists instances in an order that depends on the file's.
     places.sort(key=lambda place: (place.owner, place.name, place.matrix.ravel().tolist()))
-    remarks = [(place.name, warning) for place in places for warning in parts[place.shape].warnings]
+    remarks += [(place.name, warning) for place in places for warning in parts[place.shape].warnings]
     remarks += [
         (owner, f"{count} particle instances are left out; make them real to measure them")
         for owner, count in sorted(particles.items())
     ]
-    joined = join_meshes([_placed(parts[place.shape], place.matrix) for place in places], name)
+    joined = join_meshes([_placed(parts[place.shape], place.matrix) for place in places], one_line(name))
     return replace(joined, warnings=_told(remarks))
+
+
+def _left_out(objects: Sequence[Evaluated]) -> list[tuple[str, str]]:
+    """Names of instancers and what is to be said of them."""
+    collections = {each.original.name: instanced(each.original) for each in objects}
+    disabled = {each: disabled_when_instanced(each) for each in set(collections.values()) if each is not None}
+    return [
+        (name, f"{disabled[each]} objects that it instances are left out; enable them in viewports to measure them")
+        for name, each in collections.items()
+        if each is not None and disabled[each]
+    ]
 
 
 @dataclass(frozen=True)
@@ -112,13 +127,18 @@ class _Shape:
     """An evaluated mesh in its own coordinates.
 
     Attributes:
-        source: the object, not evaluated, whose mesh it is, known as name. depsgraph: where that is evaluated.
+        source: the object, not evaluated, that has or makes the mesh, known as name.
+        depsgraph: where that is evaluated.
+        made: a temporary copy of a mesh that no object has as its own and that has something to bake. matrix: (4, 4),
+            where it is first shown.
         positions: (V, 3) float32. triangles: (T, 3) int32. slots: by their index.
     """
 
     source: bpy.types.Object
     name: str
     depsgraph: bpy.types.Depsgraph
+    made: bpy.types.Mesh | None
+    matrix: Floats
     positions: NDArray[np.float32]
     triangles: NDArray[np.int32]
     slots: dict[int, _Slot]
@@ -139,8 +159,8 @@ def _key(each: Shown) -> _Key:
     return (mesh.as_pointer(), *(0 if found is None else found.as_pointer() for found in materials))
 
 
-def _read_shape(each: Shown, cache: TextureCache, reading: Reading) -> _Shape | None:
-    """None without faces."""
+def _read_shape(each: Shown, cache: TextureCache, reading: Reading, temporary: ExitStack) -> _Shape | None:
+    """None without faces. temporary: removes what is copied for baking."""
     object_, depsgraph = each.object, each.owner.depsgraph
     # What edit mode shows may lack modifiers: then all of them run once more, otherwise they have run.
     again = {"preserve_all_data_layers": True, "depsgraph": depsgraph} if each.edited else {}
@@ -151,16 +171,23 @@ def _read_shape(each: Shown, cache: TextureCache, reading: Reading) -> _Shape | 
         if reading.texture is not None and not len(mesh.uv_layers):
             raise MeshError(f"{each.name}: the mesh has no UV map, which the given image needs; unwrap it first")
         cut = _triangulated(mesh)
+        slots = {
+            index: _read_slot(mesh, cut, rows, _slot_material(object_, index), cache, reading)
+            for index, rows in _rows_by_slot(mesh, cut).items()
+        }
+        made = None
+        if reading.bake and each.made and any(isinstance(slot.look, Unread) for slot in slots.values()):
+            made = bpy.data.meshes.new_from_object(object_)
+            temporary.callback(bpy.data.meshes.remove, made)
         return _Shape(
             source=object_.original,
             name=each.name,
             depsgraph=depsgraph,
+            made=made,
+            matrix=each.matrix,
             positions=_attribute(mesh, "position", "vector", 3, np.float32),
             triangles=cut.vertices,
-            slots={
-                index: _read_slot(mesh, cut, rows, _slot_material(object_, index), cache, reading)
-                for index, rows in _rows_by_slot(mesh, cut).items()
-            },
+            slots=slots,
         )
     finally:
         object_.to_mesh_clear()
@@ -282,23 +309,37 @@ def _resolved(shape: _Shape, reading: Reading) -> dict[int, tuple[Look, NDArray[
     """Look and corner values of each slot; what could not be read is baked."""
     unread = {index: (slot.material, slot.look) for index, slot in shape.slots.items() if isinstance(slot.look, Unread)}
     baked: dict[int, Baked] = {}
-    why = "baking is off"
+    why = "baking is off"  # or failed
     if unread and reading.bake:
-        why = "a mesh that only instances have is not baked"
-        source = shape.source.evaluated_get(shape.depsgraph)
         try:
-            baked = bake_slots(source, shape.depsgraph, unread, reading.bake, shape.name)
+            with _bakeable(shape) as source:
+                baked = bake_slots(source, shape.depsgraph, unread, reading.bake, shape.name)
         except MeshError as error:
             why = str(error)
     found = {}
     for index, slot in shape.slots.items():
         if isinstance(slot.look, Look):
             found[index] = (slot.look, slot.corners)
-        elif index in baked and len(baked[index].corners) == len(slot.corners):
+        elif index in baked:
             found[index] = (baked[index].look, baked[index].corners)
-        else:  # a mesh that only instances have is no object's to bake
+        else:
             found[index] = (_plain_look(slot.material, slot.look, why), slot.corners)
     return found
+
+
+@contextmanager
+def _bakeable(shape: _Shape) -> Iterator[bpy.types.Object]:
+    """The object that has the shape's mesh; a temporary one for a mesh that only instances have."""
+    if shape.made is None:
+        yield shape.source.evaluated_get(shape.depsgraph)
+        return
+    stand_in = bpy.data.objects.new(shape.name, shape.made)
+    try:
+        stand_in.matrix_world = Matrix(shape.matrix.tolist())  # kept as it is, shears too: the object is in no scene
+        stand_in.color, stand_in.pass_index = shape.source.color, shape.source.pass_index
+        yield stand_in
+    finally:
+        bpy.data.objects.remove(stand_in)
 
 
 def _plain_look(material: bpy.types.Material, unread: Unread, why: str) -> Look:
@@ -308,7 +349,8 @@ def _plain_look(material: bpy.types.Material, unread: Unread, why: str) -> Look:
 
 
 def _placed(mesh: MeshArrays, matrix: Floats) -> MeshArrays:
-    return replace(mesh, positions=mesh.positions @ matrix[:3, :3].T + matrix[:3, 3])
+    with np.errstate(invalid="ignore", over="ignore"):  # coordinates that are no numbers are left out later
+        return replace(mesh, positions=mesh.positions @ matrix[:3, :3].T + matrix[:3, 3])
 
 
 def _relative(matrix: Floats, frame: Floats | None, name: str) -> Floats:
@@ -328,7 +370,7 @@ def _told(remarks: Iterable[tuple[str, str]]) -> tuple[str, ...]:
     names: dict[str, dict[str, None]] = {}
     for name, remark in remarks:
         names.setdefault(remark, {})[name] = None
-    return tuple(f"{_listed(list(those))}: {remark}" for remark, those in names.items())
+    return tuple(one_line(f"{_listed(list(those))}: {remark}") for remark, those in names.items())
 
 
 def _listed(names: list[str]) -> str:

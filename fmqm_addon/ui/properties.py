@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
-from ..blender.assets import SURFACE_TYPES
+from ..blender.assets import is_measured
 from ..blender.space import SPACES
 from ..metric.score import COLUMNS
 from ..metric.settings import FAST_SCORED_PATCHES, SETTING_NAMES, Settings
@@ -19,12 +19,11 @@ from ..report.trust import Report
 
 SEED_LIMIT = 2**31 - 1  # of an IntProperty
 CUSTOM = "CUSTOM"
-ASSET_TYPES = (*SURFACE_TYPES, "EMPTY")
 
 
 def is_asset(object_: bpy.types.Object) -> bool:
-    """Whether an object can be measured: one with a surface, or an empty, which stands for what hangs from it."""
-    return object_.type in ASSET_TYPES
+    """Whether an object can be measured: it may show a surface, or it is an empty and stands for what hangs from it."""
+    return object_.type == "EMPTY" or is_measured(object_)
 
 
 def _can_be_picked(_: Any, object_: bpy.types.Object) -> bool:

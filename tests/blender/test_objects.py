@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -23,6 +25,7 @@ from fmqm_addon.blender.measure import Measurement
 from fmqm_addon.blender.mesh import mesh_arrays
 from fmqm_addon.blender.snapshot import fingerprint, take, target_of
 from fmqm_addon.blender.space import place
+from fmqm_addon.metric.color import decode_srgb
 from fmqm_addon.metric.errors import MeshError
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.surface import MeshArrays
@@ -287,6 +290,52 @@ def test_many_instances_share_what_they_can() -> None:
     assert len(arrays.triangles) == 600 and len(arrays.materials) == 1
 
 
+FIELD = """#usda 1.0
+(
+    upAxis = "Z"
+    metersPerUnit = 1
+)
+def PointInstancer "Field"
+{
+    point3f[] positions = [(0, 0, 0), (2, 0, 0), (4, 0, 0)]
+    int[] protoIndices = [0, 1, 0]
+    rel prototypes = [</Field/Kinds/Quad>, </Field/Kinds/Leaf>]
+    def Scope "Kinds"
+    {
+        def Mesh "Quad"
+        {
+            int[] faceVertexCounts = [4]
+            int[] faceVertexIndices = [0, 1, 2, 3]
+            point3f[] points = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
+        }
+        def Mesh "Leaf"
+        {
+            int[] faceVertexCounts = [3]
+            int[] faceVertexIndices = [0, 1, 2]
+            point3f[] points = [(0, 0, 0), (1, 0, 0), (1, 1, 0)]
+        }
+    }
+}
+"""
+
+
+def test_point_instancers_of_usd_files(tmp_path: Path) -> None:
+    """Blender makes a point cloud of them, whose Geometry Nodes instance prototypes that only they show."""
+    file = tmp_path / "field.usda"
+    file.write_text(FIELD, encoding="utf-8")
+    arrays = load_mesh(str(file))
+    assert len(arrays.triangles) == 2 * 2 + 1
+    assert sorted(arrays.positions[arrays.triangles].min(axis=1)[:, 0].tolist()) == [0, 0, 2, 4, 4]
+    scenes.clear()
+    bpy.ops.wm.usd_import(filepath=str(file))
+    field = bpy.data.objects["Field"]
+    assert field.type == "POINTCLOUD"
+    assert scenes.same(take(target_of(field)).world(), replace(arrays, name="Field"))
+    parent = linked(bpy.data.objects.new("Parent", None))
+    field.parent = parent
+    assert len(take(target_of(parent)).mesh.triangles) == 5
+
+
 def test_particles_are_left_out_and_counted() -> None:
     object_, leaf = scenes.square("Emitter"), scenes.cube("Leaf")
     object_.modifiers.new("Particles", "PARTICLE_SYSTEM")
@@ -324,6 +373,22 @@ def test_what_renders_hide_of_an_instanced_collection() -> None:
     scenes.cube("Cube", collection=inner)
     scenes.cube("Hidden", collection=shape).hide_render = True
     assert len(take(target_of(instancer("Top", shape))).mesh.triangles) == 2
+
+
+def test_what_viewports_hide_of_an_instanced_collection_is_counted() -> None:
+    """In a nested collection, and in one that is disabled; Blender lists neither. Not what renders hide, too."""
+    shape, nested = library("Shape"), library("Nested")
+    inner = collection("Inner", shape)
+    inner.hide_viewport = True
+    scenes.cube("Cube", collection=inner)
+    scenes.square("Square", collection=shape)
+    scenes.cube("Disabled", collection=nested).hide_viewport = True
+    nowhere = scenes.cube("Nowhere", collection=shape)
+    nowhere.hide_viewport = nowhere.hide_render = True
+    instancer("Deep", nested, shape)
+    arrays = take(target_of(instancer("Top", shape))).mesh
+    assert len(arrays.triangles) == 2
+    assert arrays.warnings[0].startswith("Top: 2 objects that it instances are left out; enable them in viewports")
 
 
 def test_excluding_a_collection_does_not_hide_its_instances() -> None:
@@ -536,14 +601,48 @@ def test_other_kinds_are_baked_too(make: Callable[[], bpy.types.Object]) -> None
     assert [look.how for look in arrays.materials] == ["baked"]
 
 
-def test_meshes_that_only_instances_have_are_not_baked() -> None:
-    ground = scenes.square("Ground", materials=[scenes.material("Red", (1, 0, 0))])
+def test_meshes_that_only_instances_have_are_baked_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beside a mesh of the owner's own that has as many triangles and is baked, too."""
+    veins = procedural()
+    ground = scenes.cube("Ground", materials=[veins])
     tree = on_points(scenes.square("Source", materials=[scenes.material("Green", (0, 1, 0))]))
     ground.modifiers.new("Nodes", "NODES").node_group = tree
-    next(node for node in tree.nodes if node.type == "SET_MATERIAL").inputs["Material"].default_value = procedural()
+    next(node for node in tree.nodes if node.type == "SET_MATERIAL").inputs["Material"].default_value = veins
+    sizes = []
+
+    def bake_slots(object_: bpy.types.Object, *rest: object) -> object:
+        sizes.append(np.ptp([vertex.co for vertex in object_.data.vertices]))
+        return bake.bake_slots(object_, *rest)
+
+    monkeypatch.setattr(mesh, "bake_slots", bake_slots)
+    before = scenes.blocks()
     arrays = mesh_arrays([ground], "asset", Reading(bake=64))
-    assert {look.name: look.how for look in arrays.materials} == {"Red": "read", "Green": "read", "Veins": "plain"}
-    assert any("a mesh that only instances have" in warning for warning in arrays.warnings)
+    assert scenes.blocks() == before
+    assert sorted(sizes) == [1, 2]  # the node's cube has sides of 1, the ground's of 2
+    assert Counter(look.how for look in arrays.materials) == {"read": 1, "baked": 2}
+    assert np.count_nonzero(np.isin(arrays.material, np.flatnonzero(["baked" == m.how for m in arrays.materials]))) == (
+        12 + 8 * 12
+    )
+
+
+def test_an_instances_own_mesh_is_baked_where_it_stands() -> None:
+    """The color is the place in the world, of the one instance, which is sheared and mirrored."""
+    colored = scenes.material("Place")
+    place = colored.node_tree.nodes.new("ShaderNodeNewGeometry")
+    colored.node_tree.links.new(place.outputs["Position"], scenes.base_color(colored))
+    point = scenes.add("Point", [(0.2, 0.2, 0.2)], [])
+    tree = on_points(scenes.add("Nothing", [], []))
+    next(node for node in tree.nodes if node.type == "SET_MATERIAL").inputs["Material"].default_value = colored
+    point.modifiers.new("Nodes", "NODES").node_group = tree
+    parent = linked(bpy.data.objects.new("Parent", None))
+    point.parent, point.matrix_basis = parent, Matrix.Identity(4)
+    point.matrix_parent_inverse = Matrix(((0.2, 0.1, 0, 0.3), (0, -0.3, 0.05, 0.5), (0, 0, 0.2, 0.4), (0, 0, 0, 1)))
+    arrays = mesh_arrays([point], "asset", Reading(bake=128))
+    (look,) = arrays.materials
+    middle = arrays.positions[arrays.triangles].mean(axis=1)
+    assert look.how == "baked" and len(middle) == 12
+    seen = decode_srgb(look.color.lookup(arrays.corners.mean(axis=1).astype(np.float64)))
+    assert np.abs(seen - middle).max() < 0.02
 
 
 def test_the_panel_says_that_it_bakes() -> None:
