@@ -226,7 +226,10 @@ def image_path(image: bpy.types.Image) -> str:
     """The absolute path of an image's file, "" for an image made in Blender."""
     if image.source == "GENERATED" or not image.filepath:
         return ""
-    return os.path.normpath(bpy.path.abspath(image.filepath, library=image.library))
+    path = bpy.path.abspath(image.filepath, library=image.library)
+    if "\\" in path and not os.path.exists(path):  # written on Windows, as Blender reads it elsewhere
+        path = path.replace("\\", "/")
+    return os.path.normpath(path)
 
 
 def tile_path(image: bpy.types.Image, number: int) -> str:

@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from .color import ImageFacts
+from .color import MISSING, ImageFacts
 from .fields import Fields, closest_on
 from .score import Result
 from .spatial import Floats, Ints, dot, morton_order, ranges
@@ -26,6 +26,7 @@ SIGN_IN_DOUBT = 0.01  # of samples whose side is doubtful on one mesh and not th
 LEAST_COVERED = 0.6  # of the reference's area; the gaps between round patches alone leave out up to 0.25 (measured)
 FLIPPED = 0.01  # of samples; a renderer that culls back faces shows holes there
 ADDED = 0.005  # of the distorted mesh's area; floating junk that the score leaves out
+MAGENTA = 0.01  # of samples; images or tiles of UDIM sets are missing there
 UV_MISSING = 0.01  # of the textured area; it is painted with a single pixel
 
 FLIPPED_COSINE = -0.5  # between the faces nearest to a sample, which noise and decimation turn by less. The metric
@@ -104,6 +105,7 @@ def assessing(reference: Surface, distorted: Surface, result: Result, known: Seq
             Fact("sign_in_doubt", _share(doubt), "share of samples"),
             Fact("samples_by_material", _samples_by_material(surface, fields), "share of samples"),
             Fact("see_through", share, "share of samples"),
+            Fact("magenta", _magenta_share(surface, fields), "share of samples"),
         )
         for (surface, fields), doubt, share in zip(compared, doubtful, see_through, strict=True)
     ]
@@ -347,6 +349,12 @@ def _see_through(surface: Surface, fields: Fields) -> Work[float]:
     return count / len(fields.triangle)
 
 
+def _magenta_share(surface: Surface, fields: Fields) -> float:
+    """Share of samples on materials with images that have the color Blender shows for an image that is not there."""
+    has_image = np.array([bool(material.images) for material in surface.materials])
+    return _share((fields.ncf == np.array(MISSING)).all(axis=1) & has_image[surface.material[fields.triangle]])
+
+
 def _samples_by_material(surface: Surface, fields: Fields) -> dict[str, float]:
     counts = np.bincount(surface.material[fields.triangle], minlength=len(surface.materials))
     shares: dict[str, float] = {}
@@ -418,7 +426,13 @@ def _warnings(
             "the reference only and cannot see that (score both directions)"
         )
     for name, facts in zip((reference, distorted), sides, strict=True):
-        missing = next(fact.value for fact in facts if fact.name == "uv_missing")
+        of = {fact.name: fact.value for fact in facts}
+        if of["magenta"] > MAGENTA:
+            warnings.append(
+                f"{name}: {_percent(of['magenta'])} of the samples on it are magenta, as Blender shows images and UDIM "
+                "tiles that are missing; repair its images"
+            )
+        missing = of["uv_missing"]
         if missing is not None and missing > UV_MISSING:
             warnings.append(
                 f"{name}: {_percent(missing)} of its textured area has no texture coordinates (all are 0, 0) and the "

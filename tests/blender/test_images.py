@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import bpy
@@ -11,7 +12,15 @@ import pytest
 
 from fmqm_addon.blender.bvh import BVHQuery
 from fmqm_addon.blender.headers import Limits
-from fmqm_addon.blender.images import TextureCache, image_digest, load_texture, read_pixels, tile_path, tile_place
+from fmqm_addon.blender.images import (
+    TextureCache,
+    image_digest,
+    image_path,
+    load_texture,
+    read_pixels,
+    tile_path,
+    tile_place,
+)
 from fmqm_addon.blender.material import Reading, read_look
 from fmqm_addon.blender.mesh import mesh_arrays
 from fmqm_addon.metric.errors import FileError, MeshError
@@ -117,6 +126,14 @@ def test_only_what_was_decoded_for_this_is_given_back(tmp_path: Path) -> None:
     image.pixels.foreach_set(np.zeros(16 * 16 * 4, np.float32))
     assert image.is_dirty and not read_pixels(image).values[:, :, :3].any()
     assert not np.array(image.pixels)[:3].any()
+
+
+@pytest.mark.skipif(os.sep == "\\", reason="on Windows these are the separators")
+def test_paths_written_on_windows(tmp_path: Path) -> None:
+    path = scenes.write_png(tmp_path / "image.png", scenes.noise())
+    image = bpy.data.images.load(str(path))
+    image.filepath = f"{tmp_path}/.\\image.png"
+    assert image_path(image) == str(path) and image_digest(image)
 
 
 def test_the_same_content_is_kept_once_for_all_assets(tmp_path: Path) -> None:

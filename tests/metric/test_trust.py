@@ -256,6 +256,19 @@ def test_samples_by_material_and_see_through() -> None:
     assert facts["see_through"] == share and values(trust.reference)["see_through"] == 0
 
 
+def test_magenta_of_missing_images() -> None:
+    """Only on materials that have images: others may be magenta on purpose."""
+    magenta = PlainColor((1.0, 0.0, 1.0))
+    mesh = mesh_arrays(sphere(), (magenta,))
+    named = replace(mesh, materials=(replace(mesh.materials[0], images=(image("base color", "", missing=True),)),))
+    trust, *_ = assess(mesh, named)
+    assert values(trust.distorted)["magenta"] == 1 and values(trust.reference)["magenta"] == 0
+    assert [text for text in trust.warnings if "magenta" in text] == [
+        "mesh: 100 % of the samples on it are magenta, as Blender shows images and UDIM tiles that are missing; "
+        "repair its images"
+    ]
+
+
 def image(role: str, digest: str, missing: bool = False) -> ImageFacts:
     return ImageFacts(role, f"{role}.png", f"maps/{role}.png", 4, 2, "Non-Color", missing, digest)
 
