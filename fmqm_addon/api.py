@@ -15,6 +15,8 @@ from typing import TypeAlias
 import bpy
 
 from .blender.job import Outcome, measuring
+from .blender.material import Reading
+from .blender.mesh import AS_FOUND
 from .blender.snapshot import target_of
 from .metric.score import COLUMNS, Result
 from .metric.settings import PRESETS, Settings
@@ -32,21 +34,26 @@ def measure(
     match_scale: bool = False,
     repeats: int = 1,
     reference_without_modifiers: bool = False,
+    both: bool = False,
+    bake: int = AS_FOUND.bake,
 ) -> list[Outcome]:
     """Scores of objects or collections against a reference.
 
     Args:
-        reference, distorted: mesh objects, empties with meshes below them, collections; hidden or not.
+        reference, distorted: mesh, curve, surface, text or metaball objects, with their instances; empties, which
+            stand for all below them; collections. Hidden or not.
         settings: the paper's if None; `Settings(**PRESETS["fast"])` for a quick look.
         space: "auto", "world" or "local". match_scale: undo a factor between units.
         repeats: measure with so many seeds; scores become means.
         reference_without_modifiers: the reference is its mesh without modifiers, so that an object can be
             measured against itself.
+        both: score the other direction too: `outcome.reverse`, (5,) float64 like the scores.
+        bake: side in pixels of the images onto which materials are baked that cannot be read; 0 forbids it.
 
     Returns:
         One outcome per distorted asset, in their order; `outcome.scores` is (5,) float64 in the order of
         COLUMNS, or None with the reason in `outcome.error`. `outcome.comparison.result` is a metric.score.Result
-        with patches, samples and fields.
+        with patches, samples and fields, `outcome.trust` a metric.trust.Trust: how far to believe the scores.
     """
     assets = [distorted] if isinstance(distorted, (bpy.types.Object, bpy.types.Collection)) else list(distorted)
     stepper = measuring(
@@ -56,5 +63,7 @@ def measure(
         repeats,
         space,
         match_scale,
+        both,
+        Reading(bake=bake),
     )
     return stepper.run()

@@ -37,12 +37,13 @@ from fmqm_addon.metric.settings import CENTERS, COLOR_SPACES, POOLINGS, PRESETS,
 from fmqm_addon.report.files import check_writable, write_parts
 from fmqm_addon.report.junit import below, junit_parts
 from fmqm_addon.report.page import write_page
-from fmqm_addon.report.pair import csv_parts, json_parts, table_parts
+from fmqm_addon.report.pair import csv_parts, json_parts, table_parts, trust_parts
 from fmqm_addon.report.pair_pictures import has_pictures, open_report_folder
 
 if TYPE_CHECKING:
     from fmqm_addon.batch.run import Scored
 
+MAX_BAKE = 16384  # pixels a side
 OK, FAILED, WRONG_ARGUMENTS, INTERRUPTED = 0, 1, 2, 130
 PROGRAM = "score.py"
 
@@ -133,6 +134,21 @@ def build_parser() -> OneLineParser:
         "--match-scale", action="store_true", help="undo a difference in size by a factor between units (100, 2.54)"
     )
 
+    settings.add_argument(
+        "--both", action="store_true", help="score the other direction too, which sees what only the distorted has"
+    )
+
+    reading = parser.add_argument_group("reading")
+    reading.add_argument(
+        "--bake", type=int, metavar="N",
+        help="side of baked images (default: 1024), and a missing base-color image counts as Blender shows it, "
+        "magenta; 0: nothing is baked, plain colors are taken",
+    )  # fmt: skip
+    reading.add_argument("--max-image-side", type=int, metavar="N", help="largest side of an image (default: 32768)")
+    reading.add_argument(
+        "--max-image-bytes", type=int, metavar="N", help="largest size of a decoded image (default: 1 GiB)"
+    )
+
     output = parser.add_argument_group("output")
     output.add_argument(
         "--json", metavar="FILE", help="everything as JSON; - is stdout, which then carries nothing else"
@@ -147,6 +163,7 @@ def build_parser() -> OneLineParser:
     )
     output.add_argument("--explain", action="store_true", help="a paragraph a pair: what got worse, where, how surely")
     output.add_argument("--fail-under", type=float, metavar="X", help="exit code 1 if an FMQM is below X")
+    output.add_argument("--verbose", action="store_true", help="how far to trust each score: the facts, in a table")
     output.add_argument("--quiet", action="store_true", help="no progress on stderr")
     return parser
 
@@ -168,6 +185,10 @@ def main(argv: Sequence[str], out: TextIO) -> int:
             args.attribution,
             args.explain,
             args.report or "",
+            args.both,
+            args.bake,
+            args.max_image_side,
+            args.max_image_bytes,
         )
         _check_arguments(args)
         options.settings.with_seed(options.settings.seed + args.repeats - 1)
@@ -195,6 +216,12 @@ def main(argv: Sequence[str], out: TextIO) -> int:
 def _check_arguments(args: argparse.Namespace) -> None:
     if args.repeats < 1:
         raise SettingsError(f"repeats is {args.repeats}; it must be at least 1")
+    if args.bake is not None and not 0 <= args.bake <= MAX_BAKE:
+        raise SettingsError(f"bake is {args.bake}; it must be between 0 and {MAX_BAKE}")
+    for flag in ("max_image_side", "max_image_bytes"):
+        limit = getattr(args, flag)
+        if limit is not None and limit < 1:
+            raise SettingsError(f"{flag.replace('_', '-')} is {limit}; it must be at least 1")
     if args.fail_under is not None and not 0 <= args.fail_under <= 1:
         raise SettingsError(f"fail-under is {args.fail_under}; it must be between 0 and 1")
     if args.save_fields and not args.save_fields.endswith(".npz"):
@@ -370,6 +397,8 @@ def _write(
         out.writelines(json_parts(records, settings, versions))
     else:
         out.writelines(table_parts(records))
+        if args.verbose:
+            out.writelines(trust_parts(records))
         if args.explain:
             out.writelines(f"\n{record['explanation']}\n" for record in records)
         if args.json:

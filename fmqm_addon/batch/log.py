@@ -53,6 +53,11 @@ class Log:
             self.end()
             print(f"{self._program}: {text}", file=sys.stderr, flush=True)
 
+    def note(self, text: str) -> None:
+        """What is good to know, but no error."""
+        if not self._quiet:
+            self.say(text)
+
     def end(self) -> None:
         """Clears the moving line."""
         if self._moving and not self._quiet:

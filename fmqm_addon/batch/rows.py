@@ -19,6 +19,8 @@ class Options:
         settings: of the metric, before a row's own. repeats: seeds. space, match_scale: as blender.space.place.
         attribution: whose loss it is, too. explain: in words, too.
         report: folder of the report, for pictures; "" makes none. It changes no score.
+        both: the other direction, too.
+        bake, max_image_side, max_image_bytes: as the flags; None where they are not given.
     """
 
     settings: Settings
@@ -28,6 +30,10 @@ class Options:
     attribution: bool = False
     explain: bool = False
     report: str = ""
+    both: bool = False
+    bake: int | None = None
+    max_image_side: int | None = None
+    max_image_bytes: int | None = None
 
     def settings_of(self, row: Row) -> Settings:
         return replace(self.settings, **dict(row.settings))
@@ -35,7 +41,9 @@ class Options:
     def as_dict(self) -> dict[str, Any]:
         """Plain values under the names of the command line's flags."""
         rest = {"repeats": self.repeats, "space": self.space, "match_scale": self.match_scale}
-        asked = {name: True for name in ("attribution", "explain") if getattr(self, name)}
+        asked = {name: True for name in ("attribution", "explain", "both") if getattr(self, name)}
+        reading = ("bake", "max_image_side", "max_image_bytes")
+        asked |= {name: getattr(self, name) for name in reading if getattr(self, name) is not None}
         return self.settings.as_dict() | rest | asked
 
 

@@ -21,9 +21,11 @@ from .rows import Options, Row, Task, grouped, task_of
 from .workers import end_when_stuck, end_with_parent, journal_of
 
 if TYPE_CHECKING:
+    from ..blender.material import Reading
     from ..blender.measure import Comparison, Measurement
     from ..blender.space import Placed
     from ..metric.score import Result, Stepper
+    from ..metric.settings import Settings
     from ..metric.surface import MeshArrays, Surface
 
 T = TypeVar("T")
@@ -90,6 +92,7 @@ class _Scorer:
         failure: FMQMError | None = None
         try:
             reference = self._load(row, row.reference, row.ref_texture)
+            self._tell_memory(reference, options.settings_of(row))
             measurement = Measurement(reference.world(), options.settings_of(row), options.repeats)
             self._work(measurement.prepare(), "preparing the reference")
         except FMQMError as error:
@@ -125,10 +128,17 @@ class _Scorer:
 
     def _compare(self, pair: PairScore, row: Row, reference: Placed, measurement: Measurement) -> PairScore:
         from ..blender.space import place
+        from ..blender.trust import known_facts
+        from ..report.trust import trust_dict
 
+        options = self._options
         loaded = self._load(row, row.distorted, row.texture)
-        placement = place(reference, loaded, self._options.space, self._options.match_scale)
-        compared = self._work(measurement.compare(placement.mesh), f"scoring {row.id}")
+        placement = place(reference, loaded, options.space, options.match_scale)
+        known = known_facts(placement, _reading(options))
+        compared = self._work(measurement.compare(placement.mesh, known), f"scoring {row.id}")
+        reverse = None
+        if options.both:
+            reverse = self._work(measurement.reverse(placement.mesh), f"scoring {row.id} as the reference")
         result = compared.result
         self.last = Scored(measurement.reference, compared.distorted, result)
         return replace(
@@ -138,7 +148,9 @@ class _Scorer:
             patches=len(result.patches),
             samples=len(result.samples.positions),
             space=placement.label,
-            warnings=(*placement.notes, *placement.warnings, *result.warnings),
+            warnings=(*placement.notes, *placement.warnings, *compared.warnings),
+            reverse=reverse,
+            trust=trust_dict(compared.trust),
             findings=self._findings(row, reference.world(), placement.mesh, compared, measurement),
         )
 
@@ -164,13 +176,22 @@ class _Scorer:
         self._log.show(self._units, f"loading {name}")
         began = time.perf_counter()
         from ..blender.files import load_placed
-        from ..blender.material import load_texture
+        from ..blender.images import load_texture
 
+        reading = _reading(self._options)
         try:
             with stops_wait():
-                return load_placed(row.path(name), load_texture(row.path(image)) if image else None)
+                if image:
+                    reading = replace(reading, texture=load_texture(row.path(image), reading.limits))
+                return load_placed(row.path(name), reading)
         finally:
             self._spent("load", time.perf_counter() - began)
+
+    def _tell_memory(self, reference: Placed, settings: Settings) -> None:
+        from ..blender.memory import WORTH_SAYING, peak_bytes, peak_text
+
+        if peak_bytes(reference.mesh, settings, self._options.repeats) > WORTH_SAYING:
+            self._log.note(peak_text(reference.mesh, settings, self._options.repeats))
 
     def _work(self, stepper: Stepper[T], text: str) -> T:
         """Runs a stepper to its end with its progress shown and its seconds added up by stage."""
@@ -182,3 +203,13 @@ class _Scorer:
 
     def _spent(self, stage: str, seconds: float) -> None:
         self._seconds[stage] = self._seconds.get(stage, 0.0) + seconds
+
+
+def _reading(options: Options) -> Reading:
+    """How all assets of a run are read, textures of their own aside."""
+    from ..blender.headers import DEFAULT_LIMITS, Limits
+    from ..blender.material import Reading
+
+    limits = Limits(options.max_image_side or DEFAULT_LIMITS.side, options.max_image_bytes or DEFAULT_LIMITS.decoded)
+    reading = Reading(limits=limits)
+    return reading if options.bake is None else replace(reading, bake=options.bake, stand_in=options.bake > 0)

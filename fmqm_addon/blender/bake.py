@@ -12,16 +12,17 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..metric.color import Material, Texture, encode_srgb
+from ..metric.color import ImageAlpha, Material, Opacity, Texture, encode_srgb
 from ..metric.errors import MeshError
 from ..metric.spatial import Floats
 from ..metric.surface import triangle_areas
-from .emission import Shine, shining
-from .layout import Layout, new_layout, own_layout
-from .material import Layer, Look
+from .emission import Shine, is_opaque, shining
+from .layout import LARGEST, Layout, new_layout, own_layout
+from .material import Layer, Look, Unread
 
 _MARGIN = 8  # pixels around the parts of an own UV map, for bilinear lookups at their edges
-_OPAQUE = 254.5 / 255
+_ROWS = 256  # of an image that are worked on at a time
+_OPAQUE = 254.5 / 255  # what rounds to 255
 _VALUES = {  # how the values of an attribute are called, and their number, by data type
     "FLOAT": ("value", 1, np.float32),
     "INT": ("value", 1, np.int32),
@@ -60,7 +61,7 @@ class _Part:
 def bake_slots(
     object_: bpy.types.Object,
     depsgraph: bpy.types.Depsgraph,
-    slots: Mapping[int, bpy.types.Material],
+    slots: Mapping[int, tuple[bpy.types.Material, Unread]],
     size: int,
     owner: str,
 ) -> dict[int, Baked]:
@@ -68,26 +69,25 @@ def bake_slots(
 
     Args:
         object_: evaluated; its mesh is the one that to_mesh(preserve_all_data_layers=True, depsgraph) gives.
-        slots: by Polygon.material_index; slots without faces have no result.
+        slots: what to bake and why, by Polygon.material_index; slots without faces have no result.
         size: side of the images in pixels; becomes a power of two, and larger if the faces need it.
         owner: what messages call the object.
 
     Raises:
         MeshError: this Blender has no Cycles, or it fails, or there are too many faces.
     """
-    names = ", ".join(dict.fromkeys(material.name for material in slots.values()))
     try:
         with ExitStack() as temporary:
             return _bake(object_, depsgraph, slots, size, temporary)
     except (MeshError, RuntimeError, TypeError) as error:
         why = (str(error).strip() or type(error).__name__).splitlines()[-1].removeprefix("Error: ")
-        raise MeshError(f"{owner}: material {names} cannot be baked ({why}); bake 0 takes its plain color") from error
+        raise MeshError(f"baking {owner} failed: {why}") from error
 
 
 def _bake(
     object_: bpy.types.Object,
     depsgraph: bpy.types.Depsgraph,
-    slots: Mapping[int, bpy.types.Material],
+    slots: Mapping[int, tuple[bpy.types.Material, Unread]],
     size: int,
     temporary: ExitStack,
 ) -> dict[int, Baked]:
@@ -108,26 +108,25 @@ def _bake(
         return {}
 
     mesh, uv_map = _triangles(source, parts, temporary)
-    stand_in = bpy.data.objects.new("FMQM bake", mesh)
-    temporary.callback(bpy.data.objects.remove, stand_in)
-    stand_in.matrix_world = object_.matrix_world
-    stand_in.color, stand_in.pass_index = object_.color, object_.pass_index
+    stand_in = _stand_in(object_, mesh, temporary)
     scene.collection.objects.link(stand_in)
 
-    drawn = {}
-    for shine in Shine:
-        mesh.materials.clear()
-        for part in parts:
-            material = shining(slots[part.slot].original, shine, temporary)
+    def draw(shine: Shine) -> list[NDArray[np.float32]]:
+        for index, part in enumerate(parts):
+            material = shining(slots[part.slot][0].original, shine, temporary)
             target = material.node_tree.nodes.new("ShaderNodeTexImage")
             target.image = part.image
             material.node_tree.nodes.active = target
-            mesh.materials.append(material)
+            mesh.materials[index] = material
         _run(scene, stand_in, uv_map)
-        drawn[shine] = [_pixels(part.image) for part in parts]
+        return [_pixels(part.image) for part in parts]
+
+    colors = draw(Shine.COLOR)
+    opaque = all(is_opaque(slots[part.slot][0].node_tree) for part in parts)
+    weights = [None] * len(parts) if opaque else draw(Shine.WEIGHT)
     return {
-        part.slot: Baked(_look(slots[part.slot].name, part.layout, color, weight), part.layout.corners)
-        for part, color, weight in zip(parts, drawn[Shine.COLOR], drawn[Shine.WEIGHT], strict=True)
+        part.slot: Baked(_look(*slots[part.slot], part.layout, color, weight), part.layout.corners)
+        for part, color, weight in zip(parts, colors, weights, strict=True)
     }
 
 
@@ -138,11 +137,27 @@ def _scene(like: bpy.types.Scene, temporary: ExitStack) -> bpy.types.Scene:
         scene.render.engine = "CYCLES"
     except TypeError as error:
         raise MeshError("this Blender has no Cycles") from error
-    scene.frame_set(like.frame_current, subframe=like.frame_subframe)
+    # For image sequences; other animated values are copied as they are.
+    scene.frame_current, scene.frame_subframe = like.frame_current, like.frame_subframe
     # The one sample of a pixel lies in its middle.
     scene.cycles.device, scene.cycles.samples, scene.cycles.max_bounces = "CPU", 1, 0
     scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False
     return scene
+
+
+def _stand_in(object_: bpy.types.Object, mesh: bpy.types.Mesh, temporary: ExitStack) -> bpy.types.Object:
+    """An object with another mesh of as many vertices, for shaders like the one it stands for."""
+    made = bpy.data.objects.new("FMQM bake", mesh)
+    temporary.callback(bpy.data.objects.remove, made)
+    # An object's own location, rotation and scale cannot hold a shear; the inverse of a parent's can.
+    made.parent = bpy.data.objects.new("FMQM bake", None)
+    temporary.callback(bpy.data.objects.remove, made.parent)
+    made.matrix_parent_inverse = object_.matrix_world
+    made.color, made.pass_index = object_.color, object_.pass_index
+    modeled = object_.original.data
+    if isinstance(modeled, bpy.types.Mesh) and len(modeled.vertices) == len(mesh.vertices):
+        _bend(made, _read(modeled.vertices, "co", 3, np.float32), temporary)
+    return made
 
 
 def _run(scene: bpy.types.Scene, object_: bpy.types.Object, uv_map: str) -> None:
@@ -166,23 +181,46 @@ def _run(scene: bpy.types.Scene, object_: bpy.types.Object, uv_map: str) -> None
         raise MeshError("Cycles did not finish")
 
 
-def _look(name: str, layout: Layout, drawn: NDArray[np.float32], weights: NDArray[np.float32]) -> Look:
-    """Divides the transparent out, and encodes.
+def _look(
+    material: bpy.types.Material,
+    unread: Unread,
+    layout: Layout,
+    colors: NDArray[np.float32],
+    weights: NDArray[np.float32] | None,
+) -> Look:
+    """The drawn images as samplers.
 
     Args:
-        drawn, weights: (H, W, 3), row 0 at v = 0; see emission.Shine.
+        colors, weights: (H, W, 4), row 0 at v = 0, see _pixels and Shine; colors is overwritten. None: 1 everywhere.
     """
-    opaque = np.minimum(weights[:, :, :1], 1)  # more than 1 where shaders are added
-    color = encode_srgb(np.divide(drawn, opaque, out=np.zeros_like(drawn), where=opaque > 0))
-    layout.fill(color)
-    texture = Texture(_bytes(color), extension="extend")
-    warning = f"material {name}: baked at {layout.side} x {layout.side}"
-    return Look(Material(name, texture, how="baked"), (Layer("uv", ""),), (warning,))
+    opaque = weights is None or weights[:, :, 1].min(initial=1, where=weights[:, :, 3] > 0) >= _OPAQUE
+    for rows in (slice(first, first + _ROWS) for first in range(0, layout.side, _ROWS)):
+        _encode(colors[rows], None if weights is None else weights[rows])
+    layout.fill(colors)
+    pixels = np.empty((layout.side, layout.side, 3 if opaque else 4), np.uint8)
+    for rows in (slice(first, first + _ROWS) for first in range(0, layout.side, _ROWS)):
+        pixels[::-1][rows] = np.clip(colors[rows, :, : pixels.shape[2]], 0, 1) * 255 + 0.5
+    texture = Texture(pixels, extension="extend")
+    made = Material(
+        material.name,
+        texture,
+        alpha=None if opaque else Opacity(ImageAlpha(texture)),
+        how="baked",
+        images=unread.images,
+        uv=0 if layout.own else None,
+    )
+    warning = f"material {material.name}: {unread.node} {unread.why}; baked at {layout.side} x {layout.side}"
+    return Look(made, (Layer("uv", ""),), (warning, *unread.warnings))
 
 
-def _bytes(values: NDArray[Any]) -> NDArray[np.uint8]:
-    """(H, W, C) values in [0, 1] as bytes, row 0 at the top."""
-    return np.ascontiguousarray((np.clip(values, 0, 1) * 255 + 0.5).astype(np.uint8)[::-1])
+def _encode(colors: NDArray[np.float32], weights: NDArray[np.float32] | None) -> None:
+    """Divides what is transparent out and encodes for display, in place; the fourth channel becomes the opacity."""
+    light = colors[:, :, :3]
+    if weights is not None:
+        weight = np.minimum(weights[:, :, :1], 1)  # more than 1 where shaders are added
+        np.divide(light, weight, out=light, where=weight > 0)
+        colors[:, :, 3] = weights[:, :, 1]
+    colors[:, :, :3] = encode_srgb(light)
 
 
 def _layout(mesh: bpy.types.Mesh, vertices: Floats, matrix: Floats, rows: NDArray[np.int64], size: int) -> Layout:
@@ -192,7 +230,7 @@ def _layout(mesh: bpy.types.Mesh, vertices: Floats, matrix: Floats, rows: NDArra
     active = next((layer for layer in mesh.uv_layers if layer.active_render), None)
     if active is not None:
         uv = _values(mesh.attributes[active.name])[loops]
-        own = own_layout(uv, triangle_areas(world, triangles), size)
+        own = own_layout(uv, triangle_areas(world, triangles), min(size, LARGEST))
         if own is not None:
             return own
     polygon = _polygons(mesh)[rows]
@@ -228,11 +266,27 @@ def _triangles(source: bpy.types.Mesh, parts: list[_Part], temporary: ExitStack)
     mesh.attributes.default_color_name = source.attributes.default_color_name
     mesh.use_auto_texspace = False
     mesh.texspace_location, mesh.texspace_size = source.texspace_location, source.texspace_size
+    for _ in parts:
+        mesh.materials.append(None)
     target = mesh.attributes.new("FMQM bake", "FLOAT2", "CORNER")
     target.data.foreach_set("vector", np.concatenate([part.layout.drawn for part in parts]).ravel())
     name = target.name
     mesh.update(calc_edges=True)
     return mesh, name
+
+
+def _bend(object_: bpy.types.Object, at_rest: NDArray[np.float32], temporary: ExitStack) -> None:
+    """Has the mesh bent by a shape key from how it was modeled: Generated coordinates are those at rest."""
+    position = object_.data.attributes["position"]
+    bent = _values(position)
+    if np.array_equal(bent, at_rest):
+        return
+    position.data.foreach_set("vector", at_rest.ravel())
+    temporary.callback(object_.shape_key_clear)
+    object_.shape_key_add(name="At rest")
+    key = object_.shape_key_add(name="Bent")
+    key.data.foreach_set("co", bent.ravel())
+    key.value = 1
 
 
 def _store(mesh: bpy.types.Mesh, name: str, data_type: str, domain: str, values: NDArray[Any]) -> None:
@@ -254,11 +308,11 @@ def _loop_triangles(mesh: bpy.types.Mesh, what: str) -> NDArray[Any]:
 
 
 def _pixels(image: bpy.types.Image) -> NDArray[np.float32]:
-    """(H, W, 3) linear, row 0 at v = 0; what is not a number is 0."""
+    """(H, W, 4) linear, row 0 at v = 0, the fourth 0 where nothing was drawn; what is not a number is 0."""
     width, height = image.size
     values = np.empty(width * height * 4, np.float32)
     image.pixels.foreach_get(values)
-    return np.nan_to_num(values.reshape(height, width, 4)[:, :, :3])
+    return np.nan_to_num(values, copy=False).reshape(height, width, 4)
 
 
 def _read(collection: Any, name: str, channels: int, dtype: type) -> NDArray[Any]:

@@ -22,6 +22,17 @@ class Shine(Enum):
     WEIGHT = 2
 
 
+def is_opaque(tree: bpy.types.NodeTree) -> bool:
+    """Whether none of its nodes, its groups' among them, can make a material transparent."""
+    for node in tree.nodes:
+        alpha = node.inputs.get("Alpha") if any(socket.type == "SHADER" for socket in node.outputs) else None
+        if node.type in _TRANSPARENT or (alpha is not None and (alpha.is_linked or alpha.default_value < 1)):
+            return False
+        if node.type == "GROUP" and node.node_tree is not None and not is_opaque(node.node_tree):
+            return False
+    return True
+
+
 def shining(material: bpy.types.Material, shine: Shine, temporary: ExitStack) -> bpy.types.Material:
     """A copy of a material whose shaders, in its node groups too, are emissions; mixes of them stay.
 
@@ -34,8 +45,6 @@ def shining(material: bpy.types.Material, shine: Shine, temporary: ExitStack) ->
     temporary.callback(bpy.data.materials.remove, copy)
     tree = copy.node_tree
     output = tree.get_output_node("CYCLES") or tree.get_output_node("EEVEE")
-    for node in [node for node in tree.nodes if node.type == "OUTPUT_MATERIAL" and node != output]:
-        tree.nodes.remove(node)
     if output is not None:
         output.target = "ALL"
         for name in ("Volume", "Displacement"):
@@ -53,6 +62,9 @@ def _convert(
         # A color at a shader's place shines by itself.
         if link.to_socket.type == "SHADER" and link.from_socket.type != "SHADER":
             _emission(tree, link.from_socket, [link.to_socket])
+    for node in list(tree.nodes):
+        if node.type == "SHADERTORGB":
+            _pass_color(tree, node)
     for node in list(tree.nodes):
         outputs = [socket for socket in node.outputs if socket.type == "SHADER"]
         if not outputs or node.mute:
@@ -76,6 +88,22 @@ def _group(
     return groups[key]
 
 
+def _pass_color(tree: bpy.types.NodeTree, node: bpy.types.Node) -> None:
+    """Shader to RGB, which Cycles lacks: the color of the shader before it, as if in full light."""
+    link = next(iter(node.inputs[0].links), None)
+    wanted = None if link is None else _color_of(link.from_node)
+    if wanted is None:
+        return
+    passed = tree.nodes.new("ShaderNodeGamma")  # of 1: hands a color on
+    _take_over(tree, wanted, passed.inputs["Color"])
+    for each in list(node.outputs["Color"].links):
+        tree.links.new(passed.outputs[0], each.to_socket)
+
+
+def _color_of(shader: bpy.types.Node) -> bpy.types.NodeSocket | None:
+    return shader.inputs.get("Base Color") or shader.inputs.get("Color")
+
+
 def _never_wholly(tree: bpy.types.NodeTree, factor: bpy.types.NodeSocket) -> None:
     if not factor.is_linked:
         factor.default_value = min(max(factor.default_value, _LEAST_SHARE), 1 - _LEAST_SHARE)
@@ -90,9 +118,11 @@ def _replace(tree: bpy.types.NodeTree, node: bpy.types.Node, output: bpy.types.N
     targets = [link.to_socket for link in output.links]
     color = _emission(tree, None, targets)
     if shine is Shine.COLOR:
-        wanted = node.inputs.get("Base Color") or node.inputs.get("Color")
+        wanted = _color_of(node)
         if node.type not in _TRANSPARENT and wanted is not None:
             _take_over(tree, wanted, color)
+        if "Alpha" in node.inputs and node.inputs["Alpha"].is_linked:
+            _keep_in_use(tree, node.inputs["Alpha"].links[0].from_socket, color.node.inputs["Strength"])
     elif node.type not in _TRANSPARENT:
         weights = tree.nodes.new("ShaderNodeCombineColor")
         tree.links.new(weights.outputs[0], color)
@@ -100,6 +130,15 @@ def _replace(tree: bpy.types.NodeTree, node: bpy.types.Node, output: bpy.types.N
         if "Alpha" in node.inputs:
             _take_over(tree, node.inputs["Alpha"], weights.inputs["Green"])
     tree.nodes.remove(node)
+
+
+def _keep_in_use(tree: bpy.types.NodeTree, alpha: bpy.types.NodeSocket, strength: bpy.types.NodeSocket) -> None:
+    """Cycles divides an image's color by its alpha only where the alpha is used too."""
+    one = tree.nodes.new("ShaderNodeMath")
+    one.operation = "MULTIPLY_ADD"
+    one.inputs[1].default_value, one.inputs[2].default_value = 1e-7, 1
+    tree.links.new(alpha, one.inputs[0])
+    tree.links.new(one.outputs[0], strength)
 
 
 def _emission(

@@ -5,32 +5,36 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from contextlib import redirect_stderr
+from io import StringIO
 from pathlib import Path
 
 import bpy
 
-from ..metric.color import Texture
 from ..metric.errors import FileError, FMQMError, MeshError
 from ..metric.surface import MeshArrays
+from .assets import check_object, scene_members
 from .lods import find_chains
+from .material import Reading
+from .mesh import AS_FOUND
 from .snapshot import placed
 from .space import Placed
 from .spec import SUFFIXES, split_spec
 from .truncated import check_alembic, check_ply
 
 
-def load_mesh(spec: str, texture: Texture | None = None) -> MeshArrays:
+def load_mesh(spec: str, reading: Reading = AS_FOUND) -> MeshArrays:
     """The asset in a file as one mesh in its world frame; as load_placed."""
-    return load_placed(spec, texture).world()
+    return load_placed(spec, reading).world()
 
 
-def load_placed(spec: str, texture: Texture | None = None) -> Placed:
+def load_placed(spec: str, reading: Reading = AS_FOUND) -> Placed:
     """The asset in a file as one mesh, with its place; nothing stays in the session.
 
     Args:
         spec: a path, or "file.glb:Object name" for one object, hidden or not. Of a whole file the
-            render-visible meshes count.
-        texture: replaces the base-color images of the whole asset.
+            render-visible objects of the active scene count.
+        reading: how the materials are read.
 
     Raises:
         FileError: the file is missing, unreadable or of an unknown kind, or has no such object.
@@ -39,11 +43,11 @@ def load_placed(spec: str, texture: Texture | None = None) -> Placed:
     path, object_name = split_spec(spec)
     try:
         open_file(path)
-        objects = [_named(object_name, path)] if object_name else measured_objects()
+        objects = [_named(object_name, path)] if object_name else scene_members()
         try:
             if not objects:
                 raise MeshError("no mesh in it; a surface is wanted")
-            return placed(objects, object_name or Path(path).name, texture)
+            return placed(objects, object_name or Path(path).name, reading)
         except FMQMError as error:
             raise type(error)(f"{spec}: {error}") from error
     finally:
@@ -60,16 +64,20 @@ def open_file(path: str) -> None:
     if suffix not in SUFFIXES:
         raise FileError(f"{path}: unknown file ending {suffix or '(none)'}; known: {' '.join(SUFFIXES)}")
     if not os.path.isfile(path):
-        raise FileError(f"{path}: no such file")
+        what = "it is a folder or a device; a file is wanted" if os.path.exists(path) else "no such file"
+        raise FileError(f"{path}: {what}")
     if not os.access(path, os.R_OK):
         raise FileError(f"{path}: permission denied; the file cannot be read")
     if suffix in _CHECKS:
         _CHECKS[suffix](path)
     _clear_session()
     try:
-        _open(os.path.abspath(path), suffix)
+        with redirect_stderr(StringIO()):  # Blender prints the tracebacks of importers written in Python
+            _open(os.path.abspath(path), suffix)
     except RuntimeError as error:
-        raise FileError(f"{path}: {_last_line(error)}") from error
+        raise FileError(f"{path}: {_last_line(error)}; check the file, or export it again") from error
+    except UnicodeEncodeError as error:
+        raise FileError(f"{path}: Blender takes only names in UTF-8; rename the file or its folder") from error
 
 
 def chains_of_file(path: str) -> list[tuple[str, list[tuple[int, str]]]]:
@@ -104,7 +112,7 @@ def _open(path: str, suffix: str) -> None:
         raise FileError(
             f"{path}: this Blender has no importer for {suffix}; convert the file, for example to .glb"
         ) from error
-    result = operator(filepath=path)
+    result = operator(filepath=path, **_OPTIONS.get(suffix, {}))
     if "FINISHED" not in result:
         raise FileError(f"{path}: the importer refused it ({', '.join(result).lower()})")
 
@@ -122,6 +130,8 @@ _IMPORTERS: dict[str, Callable[[], bpy.types.Operator]] = {
     ".usdz": lambda: bpy.ops.wm.usd_import,
     ".abc": lambda: bpy.ops.wm.alembic_import,
 }
+# These importers do not mend meshes unless told to, and Blender would read beyond the ends of their arrays.
+_OPTIONS = dict.fromkeys((".usd", ".usda", ".usdc", ".usdz", ".abc"), {"validate_meshes": True})
 _CHECKS = {".abc": check_alembic, ".ply": check_ply}
 
 
@@ -129,29 +139,18 @@ def _named(name: str, path: str) -> bpy.types.Object:
     found = bpy.data.objects.get(name)
     if found is None:
         raise FileError(f"{path}: no object named {name} in it")
-    if found.type != "MESH":
-        raise MeshError(f"{path}:{name}: the object is of type {found.type.lower()}; a mesh is wanted")
+    try:
+        check_object(found)
+    except MeshError as error:
+        raise MeshError(f"{path}:{error}") from error
     return found
-
-
-def measured_objects() -> list[bpy.types.Object]:
-    """The render-visible mesh objects of the active scene, by name: the order must not depend on the file's."""
-    visible: dict[str, bpy.types.Object] = {}
-
-    def visit(layer: bpy.types.LayerCollection) -> None:
-        if layer.exclude or layer.collection.hide_render:
-            return
-        for object_ in layer.collection.objects:
-            if object_.type == "MESH" and not object_.hide_render:
-                visible[object_.name_full] = object_
-        for child in layer.children:
-            visit(child)
-
-    visit(bpy.context.view_layer.layer_collection)
-    return [visible[name] for name in sorted(visible)]
 
 
 def _last_line(error: RuntimeError) -> str:
     """Operators put a report, or a whole traceback, into the error; its last line says what happened."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip() and not line.startswith("Location:")]
-    return lines[-1].removeprefix("Error: ") if lines else "the importer failed without saying why"
+    if not lines:
+        return "the importer failed without saying why"
+    if any(line.endswith("Traceback (most recent call last):") for line in lines):
+        return f"the importer broke off ({lines[-1]})"
+    return lines[-1].removeprefix("Error: ").rstrip(".")

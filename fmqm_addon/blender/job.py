@@ -12,9 +12,14 @@ from ..metric.score import Progress, Stepper, Work
 from ..metric.settings import Settings
 from ..metric.spatial import Floats
 from ..metric.surface import Surface
+from ..metric.trust import Trust
+from .images import TextureCache
+from .material import Reading
 from .measure import Comparison, Measurement
-from .snapshot import Target, fingerprint, take
+from .mesh import AS_FOUND
+from .snapshot import Target, fingerprint, take, to_bake
 from .space import Placed, Placement, place, place_counts
+from .trust import known_facts
 
 _READING = 0.05  # share of the whole that reading the scene takes, about
 
@@ -29,6 +34,7 @@ class Outcome:
         triangles, reference_triangles: counts after triangulation, before anything is left out.
         seconds: by report.pair.STAGES; reading and preparing the reference count in the first outcome.
         fingerprint: of reference and compared, as they were when they were read; see pair_fingerprint.
+        reverse: (5,) float64 scores of the other direction, where they were asked for.
         error: why there is no score.
     """
 
@@ -41,6 +47,7 @@ class Outcome:
     reference_triangles: int = 0
     seconds: dict[str, float] = field(default_factory=dict)
     fingerprint: tuple[str, str] = ("", "")
+    reverse: Floats | None = None
     error: str | None = None
 
     @property
@@ -49,10 +56,15 @@ class Outcome:
         return None if self.comparison is None else self.comparison.scores
 
     @property
+    def trust(self) -> Trust | None:
+        """How far to trust the scores; None where there is an error."""
+        return None if self.comparison is None else self.comparison.trust
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """What should be known before the scores are believed."""
         own = () if self.placement is None else self.placement.warnings
-        return own + (() if self.comparison is None else self.comparison.result.warnings)
+        return own + (() if self.comparison is None else self.comparison.warnings)
 
 
 def pair_fingerprint(reference: Target, target: Target, label: str) -> tuple[str, str]:
@@ -68,6 +80,8 @@ def measuring(
     repeats: int = 1,
     space: str = "auto",
     match_scale: bool = False,
+    both: bool = False,
+    reading: Reading = AS_FOUND,
     finished: Callable[[Outcome], None] = lambda _: None,
 ) -> Stepper[list[Outcome]]:
     """A stepper over reading, preparing and comparing.
@@ -78,9 +92,11 @@ def measuring(
     Args:
         repeats: seeds settings.seed to settings.seed + repeats - 1.
         space, match_scale: as in blender.space.place.
+        both: score the other direction too.
+        reading: how the materials are read.
         finished: gets each outcome as soon as it is there.
     """
-    return Stepper(_work(reference, compared, settings, repeats, space, match_scale, finished))
+    return Stepper(_work(reference, compared, settings, repeats, space, match_scale, both, reading, finished))
 
 
 def _work(
@@ -90,14 +106,15 @@ def _work(
     repeats: int,
     space: str,
     match_scale: bool,
+    both: bool,
+    reading: Reading,
     finished: Callable[[Outcome], None],
 ) -> Work[list[Outcome]]:
     # Read all, then measure: the user may go on working meanwhile.
-    yield Progress(f"Reading {reference.label}", 0.0)
-    read = [_read(reference)]
-    for index, target in enumerate(compared):
-        yield Progress(f"Reading {target.label}", _READING * (index + 1) / (len(compared) + 1))
-        read.append(_read(target))
+    read = []
+    for index, target in enumerate((reference, *compared)):
+        item = yield from _read(target, reading, _READING * index / (len(compared) + 1))
+        read.append(item)
     share = (1 - _READING) / (len(compared) + 1)
     outcomes: list[Outcome] = []
     original, rest = read[0], read[1:]
@@ -119,10 +136,18 @@ def _work(
             began = _READING + share * (index + 1)
             try:
                 placement = place(original.placed, item.placed, space, match_scale)
-                comparing = measurement.compare(placement.mesh)
+                comparing = measurement.compare(placement.mesh, known_facts(placement, reading))
+                one = share / 2 if both else share
                 while comparing.step():
-                    yield Progress(f"Measuring {item.target.label}", began + share * comparing.progress.done)
+                    yield Progress(f"Measuring {item.target.label}", began + one * comparing.progress.done)
                 seconds = _added(seconds, comparing.seconds)
+                reverse = None
+                if both:
+                    turned = measurement.reverse(placement.mesh)
+                    while turned.step():
+                        yield Progress(f"Measuring from {item.target.label}", began + one * (1 + turned.progress.done))
+                    reverse = turned.result
+                    seconds = _added(seconds, turned.seconds)
                 outcome = Outcome(
                     reference,
                     item.target,
@@ -132,6 +157,7 @@ def _work(
                     triangles=len(item.placed.mesh.triangles),
                     reference_triangles=len(original.placed.mesh.triangles),
                     fingerprint=(original.mark(placement), item.mark(placement)),
+                    reverse=reverse,
                     seconds={**seconds, "total": sum(seconds.values())},
                 )
             except FMQMError as reason:
@@ -153,11 +179,16 @@ class _Read:
         return self.marks[place_counts(placement.label)]
 
 
-def _read(target: Target) -> _Read:
+def _read(target: Target, reading: Reading, done: float) -> Work[_Read]:
+    yield Progress(f"Reading {target.label}", done)
     began = time.perf_counter()
+    cache = TextureCache()
+    baked = to_bake(target, reading, cache)
+    if baked:
+        yield Progress(f"Reading {target.label}: baking {', '.join(baked)}", done)
     placed, error = None, None
     try:
-        placed = take(target)
+        placed = take(target, reading, cache)
     except FMQMError as reason:
         error = str(reason)
     marks = (fingerprint(target, False), fingerprint(target, True))

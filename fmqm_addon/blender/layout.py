@@ -16,6 +16,7 @@ from ..metric.surface import triangle_areas
 LARGEST = 8192  # pixels a side
 _ROOMY, _TIGHT = 4, 2  # smallest sides of cells: one that still shows gradients, one that is left if there is no room
 _NUDGE = 0.004  # pixels; a baker draws pixels whose centers lie inside, and those on an edge only on two sides
+_OVER = 1e-5  # outside of [0, 1] that is taken for rounding: far below half a pixel
 _EVEN = 1 / 16  # least share of the image that an own map may give to a surface, by the surface's share of the area
 _UNEVEN = 0.01  # share of the area that may be worse off
 
@@ -34,12 +35,14 @@ class Layout:
         drawn: (T, 3, 2) float32 those for the baker, larger by a hair.
         halves: (P, 4) column and row of the right angle's pixel, direction of the legs (1 or -1), their length in
             pixels: the triangles for which fill() completes what bilinear lookups read.
+        own: the corners are the mesh's own UV map.
     """
 
     side: int
     corners: NDArray[np.float32]
     drawn: NDArray[np.float32]
     halves: Ints
+    own: bool = False
 
     def fill(self, pixels: NDArray[Any]) -> None:
         """Completes a baked image, (side, side, C) with row 0 at v = 0.
@@ -65,7 +68,7 @@ def own_layout(uv: NDArray[np.float32], areas: Floats, side: int) -> Layout | No
     Args:
         uv: (T, 3, 2). areas: (T,) of the triangles on the surface. side: of the image.
     """
-    if not (np.isfinite(uv).all() and uv.min(initial=0) >= 0 and uv.max(initial=1) <= 1):
+    if not (np.isfinite(uv).all() and uv.min(initial=0) >= -_OVER and uv.max(initial=1) <= 1 + _OVER):
         return None
     a, b, c = (uv[:, k].astype(np.float64) for k in range(3))
     shares = np.abs(_cross2(b - a, c - a)) / 2
@@ -73,7 +76,7 @@ def own_layout(uv: NDArray[np.float32], areas: Floats, side: int) -> Layout | No
         return None
     if _covered(uv, side).max() > 1:
         return None
-    return Layout(side, uv, uv, np.empty((0, 4), np.int64))
+    return Layout(side, uv, uv, np.empty((0, 4), np.int64), own=True)
 
 
 def new_layout(vertices: Floats, triangles: Ints, place: Ints, quad: Ints, side: int) -> Layout:

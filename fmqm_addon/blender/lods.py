@@ -10,7 +10,7 @@ from typing import TypeAlias
 
 import bpy
 
-from .snapshot import contains_mesh
+from .snapshot import contains_surface
 
 Asset: TypeAlias = bpy.types.Object | bpy.types.Collection
 
@@ -44,15 +44,15 @@ def find_lods(scene: bpy.types.Scene, active: bpy.types.Object | None) -> LODGro
     In this order: names of objects, the children of an FBX LodGroup empty, names of collections, and the
     members of the active object's collection, of which the one with the most faces is the finest.
     """
-    objects = [object_ for object_ in scene.objects if contains_mesh(object_)]
+    objects = [object_ for object_ in scene.objects if contains_surface(object_)]
     family = _family(active)
     by_name = _by_names(_outermost(objects), family)
     if by_name:
         return LODGroup(by_name, "names")
     for empty in (*family, *(object_ for object_ in objects if active is None)):
         if empty.type == "EMPTY" and empty.get("fbx_type") == "LodGroup":
-            return LODGroup(_by_level(child for child in empty.children if contains_mesh(child)), "LodGroup")
-    collections = [c for c in scene.collection.children_recursive if lod_of_name(c.name) and contains_mesh(c)]
+            return LODGroup(_by_level(child for child in empty.children if contains_surface(child)), "LodGroup")
+    collections = [c for c in scene.collection.children_recursive if lod_of_name(c.name) and contains_surface(c)]
     mine = [c for c in collections if any(object_.name_full in c.all_objects for object_ in family)]
     by_name = _by_names(collections, mine)
     if by_name:

@@ -3,16 +3,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ..metric.errors import MeshError
-from ..metric.score import Evaluation, Progress, Result, Stepper, Work, as_work
+from ..metric.score import COLUMNS, Evaluation, Progress, Result, Stepper, Work, as_work
 from ..metric.settings import Settings
 from ..metric.spatial import Floats
 from ..metric.surface import MeshArrays, Surface, preparing_surface
+from ..metric.trust import Fact, Trust, assessing, surface_facts
 from .bvh import BVHQuery
 
 
@@ -24,12 +26,19 @@ class Comparison:
         scores: (5,) float64 in the order of metric.score.COLUMNS, mean over the seeds.
         stderr: (5,) standard error of that mean; None for one seed.
         result: of the first seed, with patches and fields. distorted: the prepared surface.
+        trust: what is known about the scores, from the first seed.
     """
 
     scores: Floats
     stderr: Floats | None
     result: Result
     distorted: Surface
+    trust: Trust
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What should be known before the scores are believed."""
+        return (*self.result.warnings, *self.trust.warnings)
 
 
 class Measurement:
@@ -40,6 +49,7 @@ class Measurement:
         self._settings = settings
         self._repeats = repeats
         self._evaluations: list[Evaluation] = []
+        self._facts: tuple[Fact, ...] = ()  # of the reference, from the first comparison on
 
     @property
     def reference(self) -> Surface:
@@ -49,8 +59,20 @@ class Measurement:
     def prepare(self) -> Stepper[None]:
         return Stepper(self._prepare())
 
-    def compare(self, distorted: MeshArrays) -> Stepper[Comparison]:
-        return Stepper(self._compare(distorted))
+    def compare(self, distorted: MeshArrays, known: Sequence[Fact] = ()) -> Stepper[Comparison]:
+        """Scores and their trust report.
+
+        Args:
+            known: facts about the pair that begin the report, such as where the two were put.
+        """
+        return Stepper(self._compare(distorted, known))
+
+    def reverse(self, distorted: MeshArrays) -> Stepper[Floats]:
+        """The other direction, the distorted mesh as the reference: (5,) float64 mean scores over the seeds.
+
+        Sees what only the distorted mesh has, and costs a preparation of its own.
+        """
+        return Stepper(self._reverse(distorted))
 
     def _prepare(self) -> Work[None]:
         yield Progress("prepare", 0.0)
@@ -61,28 +83,52 @@ class Measurement:
             yield from _scaled(evaluation.prepare(), 0.05 + 0.95 * repeat / self._repeats, 0.95 / self._repeats)
             self._evaluations.append(evaluation)
 
-    def _compare(self, distorted: MeshArrays) -> Work[Comparison]:
-        yield Progress("prepare", 0.0)
-        preparing = preparing_surface(distorted, BVHQuery, self.reference.frame)
-        surface = yield from as_work(preparing, "prepare", 0.0, 0.05)
-        yield Progress("prepare", 0.05)
-        results = []
-        for repeat, evaluation in enumerate(self._evaluations):
-            stepper = evaluation.compare(surface)
-            try:
-                yield from _scaled(stepper, 0.05 + 0.95 * repeat / self._repeats, 0.95 / self._repeats)
-            except MeshError as error:
-                raise MeshError(f"{distorted.name}: {error}") from error
-            results.append(stepper.result)
+    def _compare(self, distorted: MeshArrays, known: Sequence[Fact]) -> Work[Comparison]:
+        surface, results = yield from self._results(distorted, 0.0, 0.92)
+        if not self._facts:
+            self._facts = yield from as_work(surface_facts(self.reference), "features", 0.92, 0.96)
+        assessed = assessing(self.reference, surface, results[0], self._facts)
+        trust = yield from as_work(assessed, "features", 0.96, 1.0)
         scores = np.array([result.scores for result in results])
-        if not np.isfinite(scores).all():
-            raise MeshError(
-                f"{distorted.name}: the scores are not finite; its coordinates are beyond what can be measured"
-            )
         stderr = None
         if len(results) > 1:
             stderr = scores.std(axis=0, ddof=1) / np.sqrt(len(results))
-        return Comparison(scores.mean(axis=0), stderr, results[0], surface)
+        pair = (*known, *trust.pair, _error_fact(stderr, len(results)))
+        return Comparison(scores.mean(axis=0), stderr, results[0], surface, replace(trust, pair=pair))
+
+    def _reverse(self, distorted: MeshArrays) -> Work[Floats]:
+        other = Measurement(distorted, self._settings, self._repeats)
+        yield from _scaled(other.prepare(), 0.0, 0.5)
+        _, results = yield from other._results(self._mesh, 0.5, 0.5)
+        scores: Floats = np.mean([result.scores for result in results], axis=0)
+        return scores
+
+    def _results(self, distorted: MeshArrays, first: float, share: float) -> Work[tuple[Surface, list[Result]]]:
+        """The prepared mesh and its result for each seed; progress goes from first on by the share."""
+        yield Progress("prepare", first)
+        preparing = preparing_surface(distorted, BVHQuery, self.reference.frame)
+        surface = yield from as_work(preparing, "prepare", first, first + 0.05 * share)
+        yield Progress("prepare", first + 0.05 * share)
+        results = []
+        each = 0.95 * share / self._repeats
+        for repeat, evaluation in enumerate(self._evaluations):
+            stepper = evaluation.compare(surface)
+            try:
+                yield from _scaled(stepper, first + 0.05 * share + each * repeat, each)
+            except MeshError as error:
+                raise MeshError(f"{distorted.name}: {error}") from error
+            results.append(stepper.result)
+        if not all(np.isfinite(result.scores).all() for result in results):
+            raise MeshError(
+                f"{distorted.name}: the scores are not finite; its coordinates are beyond what can be measured"
+            )
+        return surface, results
+
+
+def _error_fact(stderr: Floats | None, repeats: int) -> Fact:
+    if stderr is None:
+        return Fact("standard_error", None, "of FMQM", "measured with one seed; repeats tell it")
+    return Fact("standard_error", float(stderr[COLUMNS.index("FMQM")]), f"of FMQM, over {repeats} seeds")
 
 
 def _scaled(stepper: Stepper[Any], first: float, share: float) -> Work[None]:

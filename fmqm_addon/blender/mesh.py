@@ -1,132 +1,356 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Evaluated, triangulated arrays of one or many objects."""
+"""Triangulated arrays of one or many objects and their instances, with the values that their materials want."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
 from typing import Any
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 from numpy.typing import NDArray
 
-from ..metric.color import Material, Texture
-from ..metric.errors import MeshError
+from ..metric.color import Encoded, Material, VertexColor
+from ..metric.errors import MeshError, one_line
 from ..metric.spatial import Floats
 from ..metric.surface import MeshArrays, join_meshes
-from .material import SlotColor, TextureCache, slot_color
+from .assets import disabled_when_instanced, instanced
+from .bake import Baked, bake_slots
+from .evaluate import Evaluated, Shown, evaluated, shown
+from .images import TextureCache
+from .material import Layer, Look, Reading, Unread, plain_look, read_look
+
+AS_FOUND = Reading()  # with the images that the file names, baking what must be
+_NAMED = 2  # of the objects that share a warning
+_CHANNELS = {"uv": 2, "color": 4}  # of a layer
+# What scans have: colors, and no material.
+_VERTEX_COLORS = Look(Material("", Encoded(VertexColor(0)), how="none"), (Layer("color", ""),))
+
+_Rows = NDArray[np.intp] | slice  # of triangles; a slice where it is all of them
+_Key = tuple[int, ...]
 
 
 def mesh_arrays(
-    objects: Sequence[bpy.types.Object], name: str, texture: Texture | None = None, frame: Floats | None = None
+    objects: Sequence[bpy.types.Object],
+    name: str,
+    reading: Reading = AS_FOUND,
+    frame: Floats | None = None,
+    cache: TextureCache | None = None,
 ) -> MeshArrays:
-    """The objects as one mesh: modifiers applied, triangulated, in the world frame.
+    """The objects and their instances as one mesh: modifiers applied, triangulated, in the world frame.
 
     Args:
         name: what messages call the whole.
-        texture: replaces what the materials say.
+        reading: how the materials are read.
         frame: (4, 4) to the world from the frame that positions are wanted in; None is the world's own.
+        cache: of what has been read of this asset's materials already.
 
     Raises:
         MeshError: none of the objects has a face, or a color cannot be read.
     """
-    cache = TextureCache()
-    parts = []
-    with evaluated(objects) as pairs:
-        for original, (object_, depsgraph) in zip(objects, pairs, strict=True):
-            part = _object_arrays(object_, depsgraph, original.name, texture, cache, frame)
-            if part is not None:
-                parts.append(part)
-    if not parts:
+    cache = cache or TextureCache()
+    shapes: dict[_Key, _Shape | None] = {}
+    places: list[_Place] = []
+    particles: Counter[str] = Counter()
+    with evaluated(objects) as found, ExitStack() as temporary:
+        order = {each.original.as_pointer(): index for index, each in enumerate(found)}
+        for each in shown(found):
+            if each.particle:
+                particles[each.owner.original.name] += 1
+                continue
+            key = _key(each)
+            if key not in shapes:
+                shapes[key] = _read_shape(each, cache, reading, temporary)
+            if shapes[key] is not None:
+                matrix = _relative(each.matrix, frame, each.name)
+                places.append(_Place(order[each.owner.original.as_pointer()], each.name, matrix, key))
+        remarks = _left_out(found)
+        parts = {key: _as_arrays(shape, reading) for key, shape in shapes.items() if shape is not None}
+    if not places:
         what = "the mesh has no faces" if objects else "no mesh in it"
         raise MeshError(f"{name}: {what}; a surface is wanted")
-    return join_meshes(parts, name)
+    # Blender lists instances in an order that depends on the file's.
+    places.sort(key=lambda place: (place.owner, place.name, place.matrix.ravel().tolist()))
+    remarks += [(place.name, warning) for place in places for warning in parts[place.shape].warnings]
+    remarks += [
+        (owner, f"{count} particle instances are left out; make them real to measure them")
+        for owner, count in sorted(particles.items())
+    ]
+    joined = join_meshes([_placed(parts[place.shape], place.matrix) for place in places], one_line(name))
+    return replace(joined, warnings=_told(remarks))
 
 
-@contextmanager
-def evaluated(
-    objects: Sequence[bpy.types.Object],
-) -> Iterator[list[tuple[bpy.types.Object, bpy.types.Depsgraph]]]:
-    """The evaluated counterparts of objects, each with the depsgraph it belongs to.
+def _left_out(objects: Sequence[Evaluated]) -> list[tuple[str, str]]:
+    """Names of instancers and what is to be said of them."""
+    collections = {each.original.name: instanced(each.original) for each in objects}
+    disabled = {each: disabled_when_instanced(each) for each in set(collections.values()) if each is not None}
+    return [
+        (name, f"{disabled[each]} objects that it instances are left out; enable them in viewports to measure them")
+        for name, each in collections.items()
+        if each is not None and disabled[each]
+    ]
 
-    Objects that the view layer leaves out (excluded collection, disabled in viewports) have no evaluated
-    data there; they are evaluated as temporary duplicates in a temporary scene.
+
+@dataclass(frozen=True)
+class _Place:
+    """Where a shape is shown: by which of the objects, under which name, (4, 4) to the wanted frame."""
+
+    owner: int
+    name: str
+    matrix: Floats
+    shape: _Key
+
+
+@dataclass(frozen=True)
+class _Slot:
+    """The faces of a material slot.
+
+    Attributes:
+        material: in the slot. look: of the material.
+        rows: of its triangles. corners: (rows, 3, K) float32, what the look's layers hold there.
+        missing: warnings of the layers that the mesh has not.
     """
-    for object_ in objects:
-        if object_.mode == "EDIT":
-            object_.update_from_editmode()
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    depsgraph.update()
-    found = [object_.evaluated_get(depsgraph) for object_ in objects]
-    left_out = [index for index, object_ in enumerate(found) if not object_.is_evaluated]
-    if not left_out:
-        yield [(object_, depsgraph) for object_ in found]
-        return
-    frame = bpy.context.scene.frame_current
-    scene = bpy.data.scenes.new("FMQM evaluation")
-    duplicates: dict[int, bpy.types.Object] = {}
-    try:
-        scene.frame_current = frame
-        for index in left_out:
-            duplicates[index] = duplicate = objects[index].copy()
-            duplicate.hide_viewport = False
-            scene.collection.objects.link(duplicate)
-        view_layer = scene.view_layers[0]
-        view_layer.update()
-        aside = view_layer.depsgraph
-        yield [
-            (duplicates[index].evaluated_get(aside), aside) if index in duplicates else (object_, depsgraph)
-            for index, object_ in enumerate(found)
-        ]
-    finally:
-        for duplicate in duplicates.values():
-            bpy.data.objects.remove(duplicate)
-        bpy.data.scenes.remove(scene)
+
+    material: bpy.types.Material | None
+    look: Look | Unread
+    rows: _Rows
+    corners: NDArray[np.float32]
+    missing: tuple[str, ...]
 
 
-def _object_arrays(
-    object_: bpy.types.Object,
-    depsgraph: bpy.types.Depsgraph,
-    name: str,
-    texture: Texture | None,
-    cache: TextureCache,
-    frame: Floats | None,
-) -> MeshArrays | None:
-    """Arrays of one evaluated object; None if it has no faces. The name is the original's, for messages."""
-    mesh = object_.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph)
+@dataclass(frozen=True)
+class _Shape:
+    """An evaluated mesh in its own coordinates.
+
+    Attributes:
+        source: the object, not evaluated, that has or makes the mesh, known as name.
+        depsgraph: where that is evaluated.
+        made: a temporary copy of a mesh that no object has as its own and that has something to bake. matrix: (4, 4),
+            where it is first shown.
+        positions: (V, 3) float32. triangles: (T, 3) int32. slots: by their index.
+    """
+
+    source: bpy.types.Object
+    name: str
+    depsgraph: bpy.types.Depsgraph
+    made: bpy.types.Mesh | None
+    matrix: Floats
+    positions: NDArray[np.float32]
+    triangles: NDArray[np.int32]
+    slots: dict[int, _Slot]
+
+
+@dataclass(frozen=True)
+class _Triangles:
+    """How a mesh is cut: (T, 3) int32."""
+
+    loops: NDArray[np.int32]
+    vertices: NDArray[np.int32]
+
+
+def _key(each: Shown) -> _Key:
+    """Equal for what has the same mesh and the same materials."""
+    mesh = each.object.original if each.edited else each.object.data  # edit mode: modifiers are each object's own
+    materials = (slot.material for slot in each.object.material_slots)
+    return (mesh.as_pointer(), *(0 if found is None else found.as_pointer() for found in materials))
+
+
+def _read_shape(each: Shown, cache: TextureCache, reading: Reading, temporary: ExitStack) -> _Shape | None:
+    """None without faces. temporary: removes what is copied for baking."""
+    object_, depsgraph = each.object, each.owner.depsgraph
+    # What edit mode shows may lack modifiers: then all of them run once more, otherwise they have run.
+    again = {"preserve_all_data_layers": True, "depsgraph": depsgraph} if each.edited else {}
+    mesh = object_.to_mesh(**again)
     try:
         if mesh is None or not len(mesh.polygons):
             return None
-        local = _read(mesh.vertices, "co", (len(mesh.vertices), 3), np.float32)
-        matrix = _relative(np.array(object_.matrix_world, np.float64), frame, name)
-        faces = mesh.loop_triangles
-        triangles = _read(faces, "vertices", (len(faces), 3), np.int32)
-        loops = _read(faces, "loops", (len(faces), 3), np.int32)
-        polygon = _read(faces, "polygon_index", (len(faces),), np.int32)
-        slot = _read(mesh.polygons, "material_index", (len(mesh.polygons),), np.int32)[polygon]
-        slots, material = np.unique(slot, return_inverse=True)
-
-        if texture is not None:
-            looks = [SlotColor(texture, "")] * len(slots)
-        else:
-            looks = [slot_color(_slot_material(object_, index), cache, name) for index in slots.tolist()]
-        uv = np.zeros((len(faces), 3, 2), np.float32)
-        for index, look in enumerate(looks):
-            if look.uv_map is not None:
-                here = material == index
-                uv[here] = _uv_map(mesh, look.uv_map, name)[loops[here]]
-        return MeshArrays(
-            name=name,
-            positions=local.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3],
-            triangles=triangles,
-            corners=uv,
-            material=material,
-            materials=tuple(Material(name, look.color) for look in looks),
-            warnings=tuple(warning for look in looks for warning in look.warnings),
+        if reading.texture is not None and not len(mesh.uv_layers):
+            raise MeshError(f"{each.name}: the mesh has no UV map, which the given image needs; unwrap it first")
+        cut = _triangulated(mesh)
+        slots = {
+            index: _read_slot(mesh, cut, rows, _slot_material(object_, index), cache, reading)
+            for index, rows in _rows_by_slot(mesh, cut).items()
+        }
+        made = None
+        if reading.bake and each.made and any(isinstance(slot.look, Unread) for slot in slots.values()):
+            made = bpy.data.meshes.new_from_object(object_)
+            temporary.callback(bpy.data.meshes.remove, made)
+        return _Shape(
+            source=object_.original,
+            name=each.name,
+            depsgraph=depsgraph,
+            made=made,
+            matrix=each.matrix,
+            positions=_attribute(mesh, "position", "vector", 3, np.float32),
+            triangles=cut.vertices,
+            slots=slots,
         )
     finally:
         object_.to_mesh_clear()
+
+
+def _triangulated(mesh: bpy.types.Mesh) -> _Triangles:
+    vertex = _attribute(mesh, ".corner_vert", "value", 1, np.int32)[:, 0]
+    if len(vertex) == 3 * len(mesh.polygons):  # Blender's own triangles are slow to read
+        loops = np.arange(len(vertex), dtype=np.int32).reshape(-1, 3)
+    else:
+        loops = _read(mesh.loop_triangles, "loops", (len(mesh.loop_triangles), 3), np.int32)
+    return _Triangles(loops, vertex[loops])
+
+
+def _rows_by_slot(mesh: bpy.types.Mesh, cut: _Triangles) -> dict[int, _Rows]:
+    """The triangles of each slot that has faces."""
+    if "material_index" not in mesh.attributes:
+        return {0: slice(None)}
+    of_face = _attribute(mesh, "material_index", "value", 1, np.int32)[:, 0]
+    indices = np.unique(of_face).tolist()
+    if len(indices) == 1:
+        return {indices[0]: slice(None)}
+    if len(of_face) != len(cut.loops):  # some faces are more than one triangle
+        of_face = of_face[_read(mesh.loop_triangles, "polygon_index", (len(cut.loops),), np.int32)]
+    return {index: np.flatnonzero(of_face == index) for index in indices}
+
+
+def _slot_material(object_: bpy.types.Object, index: int) -> bpy.types.Material | None:
+    """Blender draws a face whose slot does not exist with the last slot there is."""
+    slots = object_.material_slots
+    return slots[min(index, len(slots) - 1)].material if len(slots) else None
+
+
+def _read_slot(
+    mesh: bpy.types.Mesh,
+    cut: _Triangles,
+    rows: _Rows,
+    material: bpy.types.Material | None,
+    cache: TextureCache,
+    reading: Reading,
+) -> _Slot:
+    if material is None and reading.texture is None and len(mesh.color_attributes):
+        look: Look | Unread = _VERTEX_COLORS
+    else:
+        look = read_look(material, cache, reading)
+    missing = []
+    values = [np.empty((*cut.loops[rows].shape, 0), np.float32)]
+    for layer in () if isinstance(look, Unread) else look.layers:
+        found = _layer_values(mesh, layer, cut, rows)
+        if found is None:
+            missing.append(_missing(layer, material))
+            found = np.zeros((len(values[0]), 3, _CHANNELS[layer.kind]), np.float32)
+        values.append(found)
+    corners = values[-1] if len(values) <= 2 else np.concatenate(values, axis=2)
+    return _Slot(material, look, rows, corners, tuple(missing))
+
+
+def _missing(layer: Layer, material: bpy.types.Material | None) -> str:
+    kind = {"uv": "UV map", "color": "color attribute"}[layer.kind]
+    named = f" named {layer.name}" if layer.name else ""
+    user = "its color" if material is None else f"material {material.name}"
+    return f"the mesh has no {kind}{named}, which {user} needs; taken as 0, as Blender renders it"
+
+
+def _layer_values(mesh: bpy.types.Mesh, layer: Layer, cut: _Triangles, rows: _Rows) -> NDArray[np.float32] | None:
+    """(rows, 3, channels) of a layer at the triangles' corners; None if the mesh has no such layer."""
+    if layer.kind == "uv":
+        uv_map = _uv_map(mesh, layer.name)
+        return None if uv_map is None else _read(uv_map.uv, "vector", (len(mesh.loops), 2), np.float32)[cut.loops[rows]]
+    colors = _color_attribute(mesh, layer.name)
+    if colors is None:
+        return None
+    linear = _read(colors.data, "color", (len(colors.data), 4), np.float32)
+    return linear[(cut.loops if colors.domain == "CORNER" else cut.vertices)[rows]]
+
+
+def _uv_map(mesh: bpy.types.Mesh, name: str) -> bpy.types.MeshUVLoopLayer | None:
+    """The named UV map; "" is the one active for rendering, or the first where none is."""
+    maps = mesh.uv_layers
+    if name:
+        return maps.get(name)
+    return next((each for each in maps if each.active_render), maps[0] if len(maps) else None)
+
+
+def _color_attribute(mesh: bpy.types.Mesh, name: str) -> bpy.types.Attribute | None:
+    """The named color attribute; "" is the one for rendering, or the first where none is."""
+    colors = mesh.color_attributes
+    if name:
+        return colors.get(name)
+    return colors[max(colors.render_color_index, 0)] if len(colors) else None
+
+
+def _as_arrays(shape: _Shape, reading: Reading) -> MeshArrays:
+    """The shape in its own coordinates; neither it nor its warnings have a name."""
+    resolved = _resolved(shape, reading)
+    material = np.zeros(len(shape.triangles), np.int32)
+    if len(shape.slots) == 1:
+        ((_, corners),) = resolved.values()
+    else:
+        corners = np.zeros((len(material), 3, max(values.shape[2] for _, values in resolved.values())), np.float32)
+        for row, (index, (_, values)) in enumerate(resolved.items()):
+            rows = shape.slots[index].rows
+            material[rows] = row
+            corners[rows, :, : values.shape[2]] = values
+    looks = [look for look, _ in resolved.values()]
+    missing = (warning for slot in shape.slots.values() for warning in slot.missing)
+    return MeshArrays(
+        name="",
+        positions=shape.positions.astype(np.float64),
+        triangles=shape.triangles,
+        corners=corners,
+        material=material,
+        materials=tuple(look.material for look in looks),
+        warnings=(*(warning for look in looks for warning in look.warnings), *missing),
+    )
+
+
+def _resolved(shape: _Shape, reading: Reading) -> dict[int, tuple[Look, NDArray[np.float32]]]:
+    """Look and corner values of each slot; what could not be read is baked."""
+    unread = {index: (slot.material, slot.look) for index, slot in shape.slots.items() if isinstance(slot.look, Unread)}
+    baked: dict[int, Baked] = {}
+    why = "baking is off"  # or failed
+    if unread and reading.bake:
+        try:
+            with _bakeable(shape) as source:
+                baked = bake_slots(source, shape.depsgraph, unread, reading.bake, shape.name)
+        except MeshError as error:
+            why = str(error)
+    found = {}
+    for index, slot in shape.slots.items():
+        if isinstance(slot.look, Look):
+            found[index] = (slot.look, slot.corners)
+        elif index in baked:
+            found[index] = (baked[index].look, baked[index].corners)
+        else:
+            found[index] = (_plain_look(slot.material, slot.look, why), slot.corners)
+    return found
+
+
+@contextmanager
+def _bakeable(shape: _Shape) -> Iterator[bpy.types.Object]:
+    """The object that has the shape's mesh; a temporary one for a mesh that only instances have."""
+    if shape.made is None:
+        yield shape.source.evaluated_get(shape.depsgraph)
+        return
+    stand_in = bpy.data.objects.new(shape.name, shape.made)
+    try:
+        stand_in.matrix_world = Matrix(shape.matrix.tolist())  # kept as it is, shears too: the object is in no scene
+        stand_in.color, stand_in.pass_index = shape.source.color, shape.source.pass_index
+        yield stand_in
+    finally:
+        bpy.data.objects.remove(stand_in)
+
+
+def _plain_look(material: bpy.types.Material, unread: Unread, why: str) -> Look:
+    return plain_look(
+        material, f"material {material.name}: {unread.node} {unread.why}, and {why}; its plain color is taken"
+    )
+
+
+def _placed(mesh: MeshArrays, matrix: Floats) -> MeshArrays:
+    with np.errstate(invalid="ignore", over="ignore"):  # coordinates that are no numbers are left out later
+        return replace(mesh, positions=mesh.positions @ matrix[:3, :3].T + matrix[:3, 3])
 
 
 def _relative(matrix: Floats, frame: Floats | None, name: str) -> Floats:
@@ -141,21 +365,24 @@ def _relative(matrix: Floats, frame: Floats | None, name: str) -> Floats:
         raise MeshError(f"{name}: its parent has a scale of zero; mend that transform") from error
 
 
-def _slot_material(object_: bpy.types.Object, index: int) -> bpy.types.Material | None:
-    """Blender draws a face whose slot does not exist with the last slot there is."""
-    slots = object_.material_slots
-    return slots[min(index, len(slots) - 1)].material if len(slots) else None
+def _told(remarks: Iterable[tuple[str, str]]) -> tuple[str, ...]:
+    """Names and what is to be said of them as warnings: what many share is said once."""
+    names: dict[str, dict[str, None]] = {}
+    for name, remark in remarks:
+        names.setdefault(remark, {})[name] = None
+    return tuple(one_line(f"{_listed(list(those))}: {remark}") for remark, those in names.items())
 
 
-def _uv_map(mesh: bpy.types.Mesh, name: str, owner: str) -> NDArray[np.float32]:
-    """(loops, 2) of the named UV map; "" is the one active for rendering."""
-    layers = mesh.uv_layers
-    layer = layers.get(name) if name else next((layer for layer in layers if layer.active_render), None)
-    if layer is None:
-        raise MeshError(
-            f"{owner}: the mesh has no UV map{f' named {name}' if name else ''}, which its image needs; unwrap it first"
-        )
-    return _read(layer.uv, "vector", (len(mesh.loops), 2), np.float32)
+def _listed(names: list[str]) -> str:
+    """ "A", "A, B", or "A, B and 33 more"."""
+    more = len(names) - _NAMED
+    return ", ".join(names[:_NAMED]) + (f" and {more} more" if more > 0 else "")
+
+
+def _attribute(mesh: bpy.types.Mesh, name: str, key: str, width: int, dtype: type) -> NDArray[Any]:
+    """(N, width) of a built-in attribute: many times as fast as by Mesh.vertices, loops and polygons."""
+    data = mesh.attributes[name].data
+    return _read(data, key, (len(data), width), dtype)
 
 
 def _read(

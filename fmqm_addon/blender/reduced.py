@@ -13,8 +13,9 @@ import bpy
 
 from ..metric.errors import FileError, MeshError
 from ..metric.surface import MeshArrays
+from .assets import scene_members
 from .decimate import Reader, Version, add_modifiers, scene_reader
-from .files import measured_objects, open_file
+from .files import open_file
 from .spec import split_spec
 
 NOT_COLOR = "Non-Color"
@@ -32,7 +33,7 @@ def open_asset(spec: str) -> list[bpy.types.Object]:
     open_file(path)
     if name and name not in bpy.data.objects:
         raise FileError(f"{path}: no object named {name} in it")
-    objects = [bpy.data.objects[name]] if name else measured_objects()
+    objects = [bpy.data.objects[name]] if name else scene_members()
     if not any(object_.type == "MESH" for object_ in objects):
         raise MeshError(f"{spec}: no mesh in it; a surface is wanted")
     return objects

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,15 +12,16 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..metric.color import Texture
 from ..metric.errors import MeshError
 from ..metric.spatial import Floats
-from ..metric.surface import MeshArrays, join_meshes
-from .mesh import evaluated, mesh_arrays
-from .space import Placed, moved
+from .assets import SURFACE_TYPES, check_object, collection_members, family_members, instanced, is_measured
+from .evaluate import evaluated
+from .images import TextureCache
+from .material import Reading, Unread, read_look
+from .mesh import AS_FOUND, mesh_arrays
+from .space import Placed
 
 OBJECT, COLLECTION = "OBJECT", "COLLECTION"
-_MAX_DEPTH = 16  # of collection instances in collection instances
 
 
 @dataclass(frozen=True)
@@ -49,11 +50,14 @@ def target_of(block: bpy.types.Object | bpy.types.Collection, bare: bool = False
     return Target(OBJECT if isinstance(block, bpy.types.Object) else COLLECTION, block.name_full, bare)
 
 
-def take(target: Target) -> Placed:
+def take(target: Target, reading: Reading = AS_FOUND, cache: TextureCache | None = None) -> Placed:
     """The asset's arrays, read from Blender; nothing stays behind.
 
-    A mesh object is itself. An empty is the meshes below it and what it instances, a collection is its
-    meshes; those disabled in renders are left out of either, unless all are.
+    An object is itself with its instances. An empty is what hangs from it and what it instances, a collection is
+    what it holds; what is hidden from rendering is left out of either, unless all is.
+
+    Args:
+        reading: how the materials are read. cache: of to_bake, just before.
 
     Raises:
         MeshError: it is gone, of another type, or holds nothing that can be measured.
@@ -62,27 +66,50 @@ def take(target: Target) -> Placed:
     if block is None:
         raise MeshError(f"{target.name}: it is no longer in the file; choose another")
     if isinstance(block, bpy.types.Collection):
-        return placed(_members(block.all_objects), target.label)
-    if block.type == "MESH":
-        if not block.users_scene:
-            raise MeshError(f"{target.name}: it has been deleted from the scene; choose another")
-        return _without_modifiers(block, target.label) if target.bare else placed([block], target.label, origin=block)
-    if block.type != "EMPTY":
-        raise MeshError(f"{target.name}: the object is of type {block.type.lower()}; a mesh is wanted")
-    return placed(_members([block, *block.children_recursive]), target.label, origin=block)
+        return placed(collection_members(block), target.label, reading, cache=cache)
+    if block.type == "EMPTY":
+        return placed(family_members(block), target.label, reading, block, cache)
+    check_object(block)
+    if not block.users_scene:
+        raise MeshError(f"{target.name}: it has been deleted from the scene; choose another")
+    if target.bare:
+        return _without_modifiers(block, target.label, reading, cache)
+    return placed([block], target.label, reading, block, cache)
+
+
+def to_bake(target: Target, reading: Reading, cache: TextureCache) -> tuple[str, ...]:
+    """Names of the materials that take will bake, which takes a while; what is read meanwhile is in the cache."""
+    if not reading.bake:
+        return ()
+    members = _members(target)
+    materials = {
+        slot.material.name: slot.material
+        for object_ in (*members, *_instances_of(members))
+        for slot in object_.material_slots
+        if slot.material is not None
+    }
+    return tuple(name for name in sorted(materials) if _is_unread(materials[name], reading, cache))
+
+
+def _is_unread(material: bpy.types.Material, reading: Reading, cache: TextureCache) -> bool:
+    try:
+        return isinstance(read_look(material, cache, reading), Unread)
+    except MeshError:  # take says so, if a face has it
+        return False
 
 
 def placed(
     objects: Sequence[bpy.types.Object],
     name: str,
-    texture: Texture | None = None,
+    reading: Reading = AS_FOUND,
     origin: bpy.types.Object | None = None,
+    cache: TextureCache | None = None,
 ) -> Placed:
     """Objects as one mesh in the frame of their origin.
 
     Args:
         origin: the object whose frame it is; None is the only one, or the one that all hang from, or else the world.
-        texture: replaces what the materials say.
+        reading: how the materials are read.
 
     Raises:
         MeshError: none of them has a face, or a color cannot be read.
@@ -93,58 +120,30 @@ def placed(
         roots = {_root(object_).name_full: _root(object_) for object_ in objects}
         origin = next(iter(roots.values())) if len(roots) == 1 else None
     matrix = np.eye(4) if origin is None else _matrix_of(origin)
-    return Placed(_arrays(objects, name, texture, matrix, 0), matrix)
+    return Placed(mesh_arrays(objects, name, reading, matrix, cache), matrix)
 
 
-def contains_mesh(block: bpy.types.Object | bpy.types.Collection) -> bool:
-    """Whether there is a mesh to measure in an object or collection, faces or not."""
+def contains_surface(block: bpy.types.Object | bpy.types.Collection) -> bool:
+    """Whether there is something to measure in an object or collection, faces or not."""
     if isinstance(block, bpy.types.Collection):
-        return bool(_members(block.all_objects))
-    return block.type == "MESH" or (block.type == "EMPTY" and bool(_members([block, *block.children_recursive])))
+        return any(is_measured(object_) for object_ in block.all_objects)
+    return is_measured(block) or (block.type == "EMPTY" and any(map(is_measured, block.children_recursive)))
 
 
-def _arrays(
-    objects: Sequence[bpy.types.Object], name: str, texture: Texture | None, frame: Floats, depth: int
-) -> MeshArrays:
-    """Meshes, and what the instancing empties among the objects show, in the frame."""
-    meshes = [object_ for object_ in objects if object_.type == "MESH"]
-    instancers = [object_ for object_ in objects if depth < _MAX_DEPTH and _instanced(object_) is not None]
-    parts = [mesh_arrays(meshes, name, texture, frame)] if meshes or not instancers else []
-    for instancer in instancers:
-        collection = instancer.instance_collection
-        offset = np.eye(4)
-        offset[:3, 3] = collection.instance_offset
-        inner = _arrays(_members(collection.all_objects), name, texture, offset, depth + 1)
-        matrix = _matrix_of(instancer)
-        parts.append(moved(inner, np.eye(4) if np.array_equal(matrix, frame) else np.linalg.inv(frame) @ matrix))
-    return join_meshes(parts, name)
-
-
-def _without_modifiers(object_: bpy.types.Object, label: str) -> Placed:
+def _without_modifiers(object_: bpy.types.Object, label: str, reading: Reading, cache: TextureCache | None) -> Placed:
     """By way of a duplicate of the object, on the same mesh."""
     if object_.mode == "EDIT":
         object_.update_from_editmode()
     duplicate = object_.copy()
     try:
         duplicate.modifiers.clear()
-        result = placed([duplicate], label, origin=duplicate)
+        result = placed([duplicate], label, reading, duplicate, cache)
         warnings = tuple(w.replace(duplicate.name, object_.name, 1) for w in result.mesh.warnings)
         return replace(result, mesh=replace(result.mesh, warnings=warnings))
     except MeshError as error:
         raise MeshError(str(error).replace(duplicate.name, object_.name)) from error
     finally:
         bpy.data.objects.remove(duplicate)
-
-
-def _members(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
-    """The meshes and instancing empties, by name: the order must not depend on the scene's."""
-    found = [object_ for object_ in objects if object_.type == "MESH" or _instanced(object_) is not None]
-    visible = [object_ for object_ in found if not object_.hide_render]
-    return sorted(visible or found, key=lambda object_: object_.name_full)
-
-
-def _instanced(object_: bpy.types.Object) -> bpy.types.Collection | None:
-    return object_.instance_collection if object_.instance_type == "COLLECTION" else None
 
 
 def _root(object_: bpy.types.Object) -> bpy.types.Object:
@@ -155,8 +154,8 @@ def _root(object_: bpy.types.Object) -> bpy.types.Object:
 
 def _matrix_of(object_: bpy.types.Object) -> Floats:
     """(4, 4) float64, up to date, wherever the object is."""
-    with evaluated([object_]) as [(found, _)]:
-        return np.array(found.matrix_world, np.float64)
+    with evaluated([object_]) as [found]:
+        return np.array(found.object.matrix_world, np.float64)
 
 
 def fingerprint(target: Target, place_counts: bool) -> str:
@@ -165,25 +164,60 @@ def fingerprint(target: Target, place_counts: bool) -> str:
     Original data, not evaluated: cheap, and the same whether the object is hidden. "" if it is gone.
     """
     block = target.find()
-    if block is None:
+    if block is None or (isinstance(block, bpy.types.Object) and not block.users_scene):
         return ""
-    if isinstance(block, bpy.types.Collection):
-        objects = _members(block.all_objects)
-    else:
-        if not block.users_scene:
-            return ""
-        objects = [block] if block.type == "MESH" else _members([block, *block.children_recursive])
+    objects = _members(target)
     digest = hashlib.blake2b(digest_size=12)
     for object_ in objects:
-        matrix = np.array(object_.matrix_world, np.float32)
-        digest.update((matrix if place_counts else matrix[:3, :3]).tobytes())
-        if object_.type == "MESH":
-            _add_mesh(digest, object_.data)
-            for modifier in () if target.bare else object_.modifiers:
-                _add_values(digest, modifier)
-            for slot in object_.material_slots:
-                _add_material(digest, slot.material)
+        _add_object(digest, object_, place_counts, target.bare)
+    for object_ in _instances_of(objects):
+        _add_object(digest, object_, True, False)
     return digest.hexdigest()
+
+
+def _members(target: Target) -> list[bpy.types.Object]:
+    """The objects that an asset consists of, instances aside."""
+    block = target.find()
+    if block is None:
+        return []
+    if isinstance(block, bpy.types.Collection):
+        return collection_members(block)
+    return family_members(block) if block.type == "EMPTY" else [block]
+
+
+def _instances_of(objects: Sequence[bpy.types.Object]) -> list[bpy.types.Object]:
+    """The objects of the collections that some instance, and of those that these instance, each once."""
+    found: dict[str, bpy.types.Object] = {}
+    seen: set[str] = set()
+    waiting = list(objects)
+    while waiting:
+        collection = instanced(waiting.pop())
+        if collection is not None and collection.name_full not in seen:
+            seen.add(collection.name_full)
+            members = collection_members(collection)
+            found.update((member.name_full, member) for member in members)
+            waiting += members
+    return [found[name] for name in sorted(found)]
+
+
+def _add_object(digest: Any, object_: bpy.types.Object, place_counts: bool, bare: bool) -> None:
+    matrix = np.array(object_.matrix_world, np.float32)
+    digest.update((matrix if place_counts else matrix[:3, :3]).tobytes())
+    if object_.type == "MESH":
+        _add_mesh(digest, object_.data)
+    elif object_.type == "META":
+        for ball in object_.data.elements:
+            _add_values(digest, ball)
+    elif object_.type in SURFACE_TYPES:
+        _add_values(digest, object_.data)
+        for spline in object_.data.splines:
+            _add_values(digest, spline)
+            for points in (spline.points, spline.bezier_points):
+                digest.update(repr([_plain(point.co) for point in points]).encode())
+    for modifier in () if bare else object_.modifiers:
+        _add_values(digest, modifier)
+    for slot in object_.material_slots:
+        _add_material(digest, slot.material)
 
 
 def _add_mesh(digest: Any, mesh: bpy.types.Mesh) -> None:
@@ -226,7 +260,9 @@ def _add_material(digest: Any, material: bpy.types.Material | None) -> None:
         digest.update(repr(names).encode())
 
 
-_NOT_A_VALUE = {"location", "location_absolute", "width", "height", "select", "is_active", "dimensions"}
+_NOT_A_VALUE = {
+    "rna_type", "original", "location", "location_absolute", "width", "height", "select", "is_active", "dimensions",
+}  # fmt: skip
 _VALUES = {"BOOLEAN", "INT", "FLOAT", "STRING", "ENUM"}
 
 

@@ -7,6 +7,9 @@ of which LODs set side by side, and imports that carry transforms, need the seco
     world: as it stands.
     location: turned and scaled as it stands, but with its origin where the reference's is.
     local: its own coordinates under the reference's transform.
+
+Kinds of files do not agree on which axis is up. Where none of these fits, the first two are tried with a turn about
+the world's X axis, too.
 """
 
 from __future__ import annotations
@@ -16,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..metric.errors import MeshError
-from ..metric.spatial import Floats
+from ..metric.spatial import Floats, cross
 from ..metric.surface import MeshArrays
 
 SPACES = ("auto", "world", "local")
@@ -28,6 +31,13 @@ SUSPICIOUS = 0.05  # of the diagonal; boxes that differ by more get a warning
 # Factors between units: metric prefixes, inch, foot, yard, and their inverses.
 UNIT_FACTORS = (10.0, 100.0, 1000.0, 2.54, 25.4, 1 / 0.0254, 12.0, 1 / 0.3048, 30.48, 1 / 0.9144)
 FACTOR_TOLERANCE = 0.01  # relative; decimation moves the box a little
+
+TURNS = (90, -90, 180)  # degrees about X; from one axis that is up to another
+_TURNED = {  # exact, by degrees
+    90: np.array([(1.0, 0, 0, 0), (0, 0, -1, 0), (0, 1, 0, 0), (0, 0, 0, 1)]),
+    -90: np.array([(1.0, 0, 0, 0), (0, 0, 1, 0), (0, -1, 0, 0), (0, 0, 0, 1)]),
+    180: np.array([(1.0, 0, 0, 0), (0, -1, 0, 0), (0, 0, -1, 0), (0, 0, 0, 1)]),
+}
 
 _TINY = 1e-6  # of the diagonal; a misfit below it is rounding
 
@@ -54,7 +64,8 @@ class Placement:
 
     Attributes:
         mesh: in the reference's world.
-        place: "world", "location" or "local". factor: its size was divided by this; 1 leaves it.
+        place: "world", "location" or "local". turn: degrees about X; 0 leaves it as it is.
+        factor: its size was divided by this; 1 leaves it.
         misfit: how far the boxes' corners are apart, in the reference's box diagonals.
         to_world: (4, 4) float64, from where it is measured to where it stands.
         notes: what Auto or Match Scale did. warnings: what makes the place doubtful.
@@ -62,6 +73,7 @@ class Placement:
 
     mesh: MeshArrays
     place: str
+    turn: int
     factor: float
     misfit: float
     to_world: Floats
@@ -70,8 +82,13 @@ class Placement:
 
     @property
     def label(self) -> str:
-        """As the reports name it: "world", "local, size / 100"."""
-        return PLACE_LABELS[self.place] + (f", size / {self.factor:.6g}" if self.factor != 1 else "")
+        """As the reports name it: "world", "local, size / 100", "world, turned by 90 degrees about X"."""
+        parts = [PLACE_LABELS[self.place]]
+        if self.turn:
+            parts.append(f"turned by {self.turn} degrees about X")
+        if self.factor != 1:
+            parts.append(f"size / {self.factor:.6g}")
+        return ", ".join(parts)
 
 
 def place_counts(label: str) -> bool:
@@ -82,6 +99,7 @@ def place_counts(label: str) -> bool:
 @dataclass(frozen=True)
 class _Candidate:
     place: str
+    turn: int
     matrix: Floats  # (4, 4), from the compared mesh's own frame
     box: Floats  # (2, 3)
     factor: float
@@ -93,7 +111,7 @@ def place(reference: Placed, compared: Placed, space: str = "auto", match_scale:
 
     Args:
         space: "world" or "local", or "auto": the world, unless the boxes differ there by more than APART and
-            another place fits TIMES_BETTER.
+            another place fits TIMES_BETTER; a turn is tried where none does.
         match_scale: undo a difference in size by one of UNIT_FACTORS.
 
     Raises:
@@ -103,18 +121,26 @@ def place(reference: Placed, compared: Placed, space: str = "auto", match_scale:
         raise ValueError(f"space is {space!r}; it must be one of {', '.join(SPACES)}")
     target = _box(reference.mesh, reference.origin)
     places = {"auto": ("world", "location", "local"), "world": ("world",), "local": ("local",)}[space]
-    candidates = [
-        _candidate(name, _matrix(name, reference.origin, compared.origin), compared.mesh, target, match_scale)
-        for name in places
-    ]
+    candidates = [_candidate(name, 0, reference, compared, target, match_scale) for name in places]
     chosen = candidates[0]
     if chosen.misfit > APART:
-        best = min(candidates, key=lambda candidate: round(candidate.misfit / _TINY))  # of equal ones the first
+        best = min(candidates, key=_roughly)  # of equal ones the first
+        if best.misfit * TIMES_BETTER <= chosen.misfit:
+            chosen = best
+    if space == "auto" and chosen.misfit > APART:
+        turned = [
+            _candidate(name, turn, reference, compared, target, match_scale)
+            for name in ("world", "location")
+            for turn in TURNS
+        ]
+        best = _best_turned(turned, reference, compared.mesh)
+        candidates += turned
         if best.misfit * TIMES_BETTER <= chosen.misfit:
             chosen = best
     return Placement(
         mesh=moved(compared.mesh, chosen.matrix),
         place=chosen.place,
+        turn=chosen.turn,
         factor=chosen.factor,
         misfit=chosen.misfit,
         to_world=_undo(chosen.matrix, compared.origin, compared.mesh.name),
@@ -148,24 +174,58 @@ def misfit(box: Floats, target: Floats) -> float:
     return float(np.linalg.norm(box - target, axis=1).max()) / diagonal
 
 
-def _matrix(name: str, reference: Floats, compared: Floats) -> Floats:
+def _matrix(name: str, turn: int, reference: Floats, compared: Floats) -> Floats:
     """(4, 4), from the compared mesh's own frame to the place of that name."""
     if name == "local":
         return reference.copy()
-    matrix = compared.copy()
+    matrix = _TURNED[turn] @ compared if turn else compared.copy()
     if name == "location":
         matrix[:3, 3] = reference[:3, 3]
     return matrix
 
 
-def _candidate(name: str, matrix: Floats, mesh: MeshArrays, target: Floats, match_scale: bool) -> _Candidate:
+def _candidate(
+    name: str, turn: int, reference: Placed, compared: Placed, target: Floats, match_scale: bool
+) -> _Candidate:
+    mesh, matrix = compared.mesh, _matrix(name, turn, reference.origin, compared.origin)
     box = _box(mesh, matrix)
     factor = unit_factor(box, target) if match_scale else 1.0
     if factor != 1:
         # In the world, units scale all there is; elsewhere the origins already are at one place.
         matrix[:3, : 4 if name == "world" else 3] /= factor
         box = _box(mesh, matrix)
-    return _Candidate(name, matrix, box, factor, misfit(box, target))
+    return _Candidate(name, turn, matrix, box, factor, misfit(box, target))
+
+
+def _roughly(candidate: _Candidate) -> float:
+    """Its misfit, but for rounding."""
+    return float(np.round(candidate.misfit / _TINY))
+
+
+def _best_turned(turned: list[_Candidate], reference: Placed, mesh: MeshArrays) -> _Candidate:
+    """The best fit. A box may fit as well upside down: then where the surface lies in it decides."""
+    best = min(turned, key=_roughly)
+    equal = [candidate for candidate in turned if candidate.misfit <= best.misfit + APART]
+    if len(equal) == 1:
+        return best
+    wanted = _lopsidedness(reference.mesh, reference.origin)
+    scale = float(np.abs(wanted).max()) or 1.0
+
+    def difference(candidate: _Candidate) -> float:
+        return float(np.round(np.abs(_lopsidedness(mesh, candidate.matrix) - wanted).max() / (scale * _TINY)))
+
+    return min(equal, key=difference)
+
+
+def _lopsidedness(mesh: MeshArrays, matrix: Floats) -> Floats:
+    """(2, 3) float64: mean of the surface, and cube root of its third central moment along each axis."""
+    a, b, c = (_transformed(mesh.positions[mesh.triangles[:, k]], matrix) for k in range(3))
+    with np.errstate(all="ignore"):  # coordinates that are not finite, or too large for this, are left out
+        area, center = np.linalg.norm(cross(b - a, c - a), axis=1), (a + b + c) / 3
+        usable = np.isfinite(area) & np.isfinite(center).all(axis=1)
+        weight, center = area[usable] / area[usable].sum(), center[usable]
+        mean = weight @ center
+        return np.nan_to_num(np.stack([mean, np.cbrt(weight @ (center - mean) ** 3)]))
 
 
 def _transformed(positions: Floats, matrix: Floats) -> Floats:
@@ -200,6 +260,8 @@ def _notes(name: str, chosen: _Candidate, space: str) -> tuple[str, ...]:
         parts.append("without its location, since it stands beside the reference")
     elif chosen.place == "local" and space == "auto":
         parts.append("in local space, since it fits the reference only without its transform")
+    if chosen.turn:
+        parts.append(f"turned by {chosen.turn} degrees about X, since its axes differ from the reference's")
     if chosen.factor != 1:
         parts.append(f"at its size divided by {chosen.factor:.6g}")
     return (f"{name}: compared {', '.join(parts)}",) if parts else ()

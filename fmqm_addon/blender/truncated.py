@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Truncated files on which Blender's importers would end the whole process."""
+"""Truncated and malformed files on which Blender's importers would end the whole process."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from typing import Literal
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from ..metric.errors import FileError
 
+_COUNT = re.compile(rb"-?0*\d{1,9}")  # Blender would end the process at 2^31
 _PLY_BYTES = {
     **dict.fromkeys(("char", "uchar", "int8", "uint8"), 1),
     **dict.fromkeys(("short", "ushort", "int16", "uint16"), 2),
@@ -41,7 +43,7 @@ def check_alembic(path: str) -> None:
 
 
 def check_ply(path: str) -> None:
-    """A binary PLY must hold all the elements that its header counts.
+    """A PLY's header must make sense to Blender, and a binary file must hold the elements that it counts.
 
     Raises:
         FileError: it does not.
@@ -49,6 +51,13 @@ def check_ply(path: str) -> None:
     with open(path, "rb") as file:
         data = file.read()
     header, _, _ = data.partition(b"end_header")
+    if data.startswith(b"ply") and b"\nproperty" in header.partition(b"\nelement")[0]:
+        raise FileError(f"{path}: the PLY header lists properties of no element; export the file again")
+    for line in header.splitlines():
+        words = line.split()
+        if words[:1] == [b"element"] and not (len(words) == 3 and _COUNT.fullmatch(words[2])):
+            said = line.decode("latin-1")[:80]
+            raise FileError(f"{path}: the PLY header says {said!r}; a name and a count below a billion are wanted")
     order: Literal["little", "big"] = "big" if b"format binary_big_endian" in header else "little"
     if not data.startswith(b"ply") or b"format binary_" not in header or len(header) == len(data):
         return  # text, whose end the importer notices, or what it refuses anyway

@@ -3,7 +3,13 @@
 
 
 class FMQMError(Exception):
-    """Something given cannot be measured; the text names it and says what is wanted."""
+    """Something given cannot be measured; the text names it and says what is wanted.
+
+    One line, whatever the names in it hold.
+    """
+
+    def __str__(self) -> str:
+        return " ".join(super().__str__().splitlines())
 
 
 class SettingsError(FMQMError):

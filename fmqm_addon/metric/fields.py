@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .spatial import Floats, Ints, closest_on_triangles, dot, ranges
+from .spatial import Floats, Ints, closest_on_triangles, cross, dot, ranges
 from .surface import Surface, triangle_normals
 
 # Below the resolution of a float32 tree in a box of diagonal 1, p - p_n has no direction: p = p_n.
@@ -22,6 +22,12 @@ BOUND_SLACK, BOUND_MARGIN = 1e-4, 1e-6
 _STRIDES = (64, 8, 1)
 _BATCH = 2048  # queries of a step
 _SURFACE_BATCH = 16384  # points of a step that asks no tree
+_CANDIDATES = 1 << 20  # faces around nearest points that are looked at at once: a fan's hub may have any number
+# Rays through a soup of overlapping triangles cross hundreds of them, and a tree is asked for each crossing, while
+# testing a ray against a triangle without a tree costs about 1 / 300 of a question.
+_PROBED_RAYS = 32
+_SOUP_CROSSINGS, _SOUP_SHARE = 16, 1 / 300  # crossings of a ray from which on it is one; and of the triangles
+_RAY_TESTS = 1 << 21  # rays times triangles of a step
 
 
 @dataclass(frozen=True)
@@ -69,9 +75,13 @@ def evaluate_fields(
     sdf[on_surface] = 0.0
 
     off_surface = order[~on_surface[order]]
-    for first in range(0, len(off_surface), _BATCH):
-        batch = off_surface[first : first + _BATCH]
-        crossings = count_crossings(surface, points[batch], away[batch] / sdf[batch, None])
+    count, size = count_crossings, _BATCH
+    probe = off_surface[:: max(1, len(off_surface) // _PROBED_RAYS)]
+    if _is_soup(surface, points[probe], away[probe] / sdf[probe, None]):
+        count, size = count_crossings_of_all, max(1, _RAY_TESTS // len(surface.triangles))
+    for first in range(0, len(off_surface), size):
+        batch = off_surface[first : first + size]
+        crossings = count(surface, points[batch], away[batch] / sdf[batch, None])
         sdf[batch[crossings % 2 == 1]] *= -1
         yield 0.45 + 0.55 * (first + len(batch)) / len(off_surface)
     return Fields(nearest, triangle, sdf, ncf)
@@ -125,6 +135,36 @@ def count_crossings(surface: Surface, origins: Floats, directions: Floats) -> In
     return count
 
 
+def count_crossings_of_all(surface: Surface, origins: Floats, directions: Floats) -> Ints:
+    """As count_crossings, by testing every ray against every triangle.
+
+    A line passes through a triangle when it runs around its three edges in one sense: the products of its Pluecker
+    coordinates with theirs have one sign. They sum up to direction . normal.
+    """
+    corners = [surface.vertices.take(surface.triangles[:, k], axis=0) for k in range(3)]
+    rays = np.concatenate([directions, cross(origins, directions)], axis=1)
+    turns = []
+    for a, b in zip(corners, corners[1:] + corners[:1], strict=True):
+        turns.append(rays @ np.concatenate([cross(a, b), b - a], axis=1).T)
+    one, two, three = turns
+    along_normal = one + two + three
+    normal = cross(corners[1] - corners[0], corners[2] - corners[0])
+    height = dot(corners[0], normal) - origins @ normal.T
+    inside = ((one >= 0) & (two >= 0) & (three >= 0)) | ((one <= 0) & (two <= 0) & (three <= 0))
+    return np.count_nonzero(inside & (height * along_normal > 0), axis=1)
+
+
+def _is_soup(surface: Surface, origins: Floats, directions: Floats) -> bool:
+    """Whether rays like these cross so many triangles that asking a tree for each crossing takes too long."""
+    rays, crossings = len(origins), 0
+    limit = max(_SOUP_CROSSINGS, _SOUP_SHARE * len(surface.triangles)) * rays
+    for first in range(0, rays, 8):  # in a soup already the first few tell, and each takes long
+        crossings += int(count_crossings(surface, origins[first : first + 8], directions[first : first + 8]).sum())
+        if crossings > limit:
+            return True
+    return False
+
+
 def _settled(surface: Surface, points: Floats, triangle: Ints) -> tuple[Ints, Floats, Floats]:
     """Triangle, p_n and its barycentric weights, given the nearest triangles as a tree found them.
 
@@ -141,26 +181,34 @@ def _settled(surface: Surface, points: Floats, triangle: Ints) -> tuple[Ints, Fl
     pivot = corners[:, 2]
     on_edge = weights[rows, by_weight[:, 1]] > 0
     second = np.where(on_edge, corners[:, 1], pivot)  # of a vertex's triangles all count, of an edge's those with both
+    incident, first, last = _faces_around(surface.triangles, np.concatenate([pivot, second]))
+    (first, first_2), (last, last_2) = np.split(first, 2), np.split(last, 2)
+    fewer = last_2 - first_2 < last - first  # an edge's triangles are found at either of its ends
+    second = np.where(fewer, pivot, second)
+    first, last = np.where(fewer, first_2, first), np.where(fewer, last_2, last)
 
-    face, first, last = _faces_around(surface.triangles, pivot)
-    row = np.repeat(np.arange(len(rows)), last - first)
-    face = face[ranges(first, last)]
-    a, b, c = surface.triangles[face].T
-    with_both = (a == second[row]) | (b == second[row]) | (c == second[row])
-    row, face = row[with_both], face[with_both]
-
-    candidates, candidate_weights = closest_on(surface, points[rows[row]], face)
-    away = points[rows[row]] - candidates
-    distance = np.sqrt(dot(away, away))
-    facing = np.abs(dot(away, triangle_normals(surface.vertices, surface.triangles[face])))
-    start = np.flatnonzero(np.diff(row, prepend=-1))
-    least = np.minimum.reduceat(distance, start)
-    facing[distance > least[row] + ON_SURFACE] = -1.0
-    is_best = facing == np.maximum.reduceat(facing, start)[row]
-    _, winner = np.unique(row[is_best], return_index=True)
-    chosen = np.flatnonzero(is_best)[winner]
     triangle = triangle.copy()
-    triangle[rows], nearest[rows], weights[rows] = face[chosen], candidates[chosen], candidate_weights[chosen]
+    group = np.cumsum(last - first) // _CANDIDATES
+    for here in np.split(np.arange(len(rows)), np.flatnonzero(np.diff(group)) + 1):
+        row = np.repeat(here, last[here] - first[here])
+        face = incident[ranges(first[here], last[here])]
+        a, b, c = surface.triangles[face].T
+        with_both = (a == second[row]) | (b == second[row]) | (c == second[row])
+        row, face = row[with_both], face[with_both]
+
+        candidates, candidate_weights = closest_on(surface, points[rows[row]], face)
+        away = points[rows[row]] - candidates
+        distance = np.sqrt(dot(away, away))
+        facing = np.abs(dot(away, triangle_normals(surface.vertices, surface.triangles[face])))
+        start = np.flatnonzero(np.diff(row, prepend=-1))
+        least = np.repeat(np.minimum.reduceat(distance, start), np.diff(start, append=len(row)))
+        facing[distance > least + ON_SURFACE] = -1.0
+        most = np.repeat(np.maximum.reduceat(facing, start), np.diff(start, append=len(row)))
+        is_best = facing == most
+        _, winner = np.unique(row[is_best], return_index=True)
+        chosen = np.flatnonzero(is_best)[winner]
+        at = rows[here]
+        triangle[at], nearest[at], weights[at] = face[chosen], candidates[chosen], candidate_weights[chosen]
     return triangle, nearest, weights
 
 

@@ -169,12 +169,6 @@ class Evaluation:
                 f"{self.reference.name}: triangles larger than a patch; their edges were split for the "
                 f"patches ({len(self.reference.triangles)} to {len(mesh.triangles)} triangles, same surface)"
             )
-        extended = sum(patch.extended for patch in patches)
-        if extended:
-            warnings.append(
-                f"{self.reference.name}: {extended} of {len(patches)} patches ran out of neighbors and went on "
-                "with the nearest triangles (loose parts)"
-            )
         reach = np.abs(samples.offset)  # a sample is this near to the face it was drawn on
         fields = evaluate_fields(self.reference, samples.positions, order, reach)
         ref = yield from as_work(fields, "fields", 0.4, 1.0)

@@ -22,6 +22,7 @@ from .curve import Level, curve_svg
 from .files import write_parts
 from .junit import below
 from .pair import SHOWN
+from .trust import Report, trust_lines
 
 PAGE = "index.html"
 MEGABYTE = 2**20
@@ -309,38 +310,21 @@ def _image(path: str, alt: str, size: tuple[int, int] | None = None) -> str:
     return f'<img src="{escape(quote(path))}" alt="{escape(alt)}"{sized} loading="lazy" decoding="async">'
 
 
-def _trust(trust: Record) -> str:
+def _trust(trust: Report) -> str:
     """The facts behind a score: those of both meshes side by side, then those of the pair."""
-    reference, distorted, pair = trust["reference"], trust["distorted"], trust["pair"]
-    rows = [
-        (fact, _fact(reference.get(fact)), _fact(distorted.get(fact)), _unit(reference.get(fact, distorted.get(fact))))
-        for fact in dict.fromkeys((*reference, *distorted))
-    ]
-    both = "".join(
-        f'<tr><th scope="row">{_words(fact)}</th><td>{first}</td><td>{second}</td><td class="faint">{unit}</td></tr>'
-        for fact, first, second, unit in rows
-    )
-    alone = "".join(
-        f'<tr><th scope="row">{_words(fact)}</th><td colspan="2">{_fact(item)}</td>'
-        f'<td class="faint">{_unit(item)}</td></tr>'
-        for fact, item in pair.items()
-    )
+    rows = []
+    for line in trust_lines(trust):
+        first = f"<td>{_text(line.values[0])}</td>" if len(line.values) > 1 else ""
+        last = f"<td>{_text(line.values[-1])}</td>" if first else f'<td colspan="2">{_text(line.values[0])}</td>'
+        rows.append(
+            f'<tr><th scope="row">{_text(line.label)}</th>{first}{last}<td class="faint">{_text(line.unit)}</td></tr>'
+        )
     return (
         '<details><summary>How far to trust this score</summary><div class="scroll" tabindex="0" role="region" '
         'aria-label="Trust report"><table><thead><tr><td></td><th scope="col">Reference</th>'
-        f'<th scope="col">Distorted</th><th scope="col">Unit</th></tr></thead><tbody>{both}{alone}</tbody></table>'
+        f'<th scope="col">Distorted</th><th scope="col">Unit</th></tr></thead><tbody>{"".join(rows)}</tbody></table>'
         "</div></details>"
     )
-
-
-def _fact(item: Record | None) -> str:
-    if item is None or item["value"] is None:
-        return MISSING
-    return _value(item["value"])
-
-
-def _unit(item: Record) -> str:
-    return _text(item["unit"] if item["value"] is not None else item.get("why", item["unit"]))
 
 
 def _value(value: Any) -> str:

@@ -16,9 +16,11 @@ import numpy as np
 
 from ..metric.score import COLUMNS
 from ..metric.spatial import Floats
+from .trust import Report, trust_text
 
 SHOWN = ("FMQM", *(name for name in COLUMNS if name != "FMQM"))  # the score first, then its features
 STAGES = ("load", "prepare", "fields", "features", "total")
+REVERSE = "reverse "  # before the names of the other direction's columns
 _INDEX = {name: COLUMNS.index(name) for name in SHOWN}
 
 
@@ -32,6 +34,8 @@ class PairScore:
         seconds: by STAGES; what several pairs share is counted in the first.
         error: why there are no scores.
         space: where the two were compared, as blender.space.Placement.label has it.
+        reverse: (5,) scores of the other direction, the distorted mesh as the reference; None: not asked for.
+        trust: as report.trust.trust_dict has it.
         findings: what else was asked for, by its key in the record: where, attribution, pictures.
     """
 
@@ -45,6 +49,8 @@ class PairScore:
     warnings: tuple[str, ...] = ()
     error: str | None = None
     space: str | None = None
+    reverse: Floats | None = None
+    trust: Report | None = None
     findings: dict[str, Any] = field(default_factory=dict)
 
 
@@ -53,7 +59,7 @@ def json_text(pairs: Sequence[PairScore], settings: dict[str, Any], versions: di
 
 
 def csv_text(pairs: Sequence[PairScore]) -> str:
-    return "".join(csv_parts(map(pair_record, pairs)))
+    return "".join(csv_parts([pair_record(pair) for pair in pairs]))
 
 
 def table_text(pairs: Sequence[PairScore]) -> str:
@@ -74,23 +80,39 @@ def json_parts(
 
 
 def csv_parts(records: Iterable[Mapping[str, Any]]) -> Iterator[str]:
-    """Numbers at full precision with a decimal point, whatever the locale; fields that failed are empty."""
+    """Numbers at full precision with a decimal point, whatever the locale; fields that failed are empty.
+
+    The other direction's columns are there, at the end, where it was measured. Goes through the records twice.
+    """
     names = ("id", "reference", "distorted", *SHOWN, "error")
-    yield _csv_line(names)
+    turned = SHOWN if _any_reverse(records) else ()
+    yield _csv_line((*names, *(f"{REVERSE}{name}" for name in turned)))
     for record in records:
-        values = (record[name] for name in names)
+        reverse = record["reverse"] or dict.fromkeys(SHOWN)
+        values = [record[name] for name in names] + [reverse[name] for name in turned]
         yield _csv_line("" if value is None else repr(value) if isinstance(value, float) else value for value in values)
 
 
 def table_parts(records: Iterable[Mapping[str, Any]]) -> Iterator[str]:
-    """An aligned table, one row a record; goes through the records twice."""
-    header = ("id", *SHOWN)
+    """An aligned table, one row a record; goes through the records three times.
+
+    The other direction's FMQM is the last column, where it was measured.
+    """
+    both = _any_reverse(records)
+    header = ("id", *SHOWN, *([f"{REVERSE}FMQM"] if both else []))
     widths = [len(name) for name in header]
     for record in records:
-        widths = [max(width, len(cell)) for width, cell in zip(widths, _cells(record), strict=True)]
-    for cells in chain([header], map(_cells, records)):
+        widths = [max(width, len(cell)) for width, cell in zip(widths, _cells(record, both), strict=True)]
+    for cells in chain([header], (_cells(record, both) for record in records)):
         aligned = (cell.rjust(width) for cell, width in zip(cells[1:], widths[1:], strict=True))
         yield "  ".join((cells[0].ljust(widths[0]), *aligned)).rstrip() + "\n"
+
+
+def trust_parts(records: Iterable[Mapping[str, Any]]) -> Iterator[str]:
+    """The trust report of each record that has one, under its name."""
+    for record in records:
+        if record["trust"]:
+            yield f"\n{record['id']} against {record['reference']}\n{trust_text(record['trust'])}"
 
 
 def pair_record(pair: PairScore) -> dict[str, Any]:
@@ -107,16 +129,24 @@ def pair_record(pair: PairScore) -> dict[str, Any]:
         "seconds": {stage: pair.seconds.get(stage, 0.0) for stage in STAGES},
         "warnings": list(pair.warnings),
         "error": pair.error,
+        "reverse": None if pair.reverse is None else _columns(pair.reverse),
+        "trust": pair.trust,
         **pair.findings,
     }
 
 
-def _cells(record: Mapping[str, Any]) -> tuple[str, ...]:
+def _any_reverse(records: Iterable[Mapping[str, Any]]) -> bool:
+    return any(record["reverse"] is not None for record in records)
+
+
+def _cells(record: Mapping[str, Any], both: bool) -> tuple[str, ...]:
+    reverse = record["reverse"]
+    turned = [f"{reverse['FMQM']:.4f}" if reverse else "-"] if both else []
     if record["FMQM"] is None:
-        return (record["id"], *["-"] * len(SHOWN))
+        return (record["id"], *["-"] * len(SHOWN), *turned)
     stderr = record["stderr"]
     spread = {name: f" ±{stderr[name]:.4f}" if stderr else "" for name in SHOWN}
-    return (record["id"], *(f"{record[name]:.4f}{spread[name]}" for name in SHOWN))
+    return (record["id"], *(f"{record[name]:.4f}{spread[name]}" for name in SHOWN), *turned)
 
 
 def _csv_line(values: Iterable[str]) -> str:

@@ -128,7 +128,7 @@ class FMQM_OT_add_selected(bpy.types.Operator):  # noqa: N801
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if not any(is_asset(o) for o in context.selected_objects):
-            cls.poll_message_set("Select a mesh, or an empty with meshes")
+            cls.poll_message_set("Select objects with a surface, or an empty with such objects")
             return False
         return True
 
@@ -145,7 +145,7 @@ class FMQM_OT_add_selected(bpy.types.Operator):  # noqa: N801
 class FMQM_OT_add_collection(bpy.types.Operator):  # noqa: N801
     bl_idname = "fmqm.add_collection"
     bl_label = "Add Active Collection"
-    bl_description = "Add the active collection to the list; its meshes count as one object"
+    bl_description = "Add the active collection to the list; its objects count as one"
     bl_options: ClassVar = {"REGISTER", "UNDO"}
 
     @classmethod

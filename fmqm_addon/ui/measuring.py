@@ -15,6 +15,7 @@ from ..blender.job import Outcome, measuring
 from ..blender.snapshot import Target, target_of
 from ..metric.errors import FMQMError
 from ..metric.score import Stepper
+from ..report.trust import trust_dict
 from . import session, watch
 from .inputs import reference_of
 from .properties import PRESET_PROPERTIES, FMQMRow, item_target, metric_settings, numbers_text
@@ -26,7 +27,7 @@ def why_not(fmqm: FMQMScene) -> str:
     """Why there is nothing to measure yet, for the greyed-out button; "" if there is. Cheap: it runs at each redraw."""
     reference = reference_of(fmqm)
     if reference is None:
-        return "Choose a reference: the original mesh"
+        return "Choose a reference: the original"
     compared = [target for item in fmqm.compared if (target := item_target(item)) is not None]
     if not compared:
         return "Add an object to compare with the reference"
@@ -69,7 +70,11 @@ class FMQM_OT_measure(SteppedOperator, bpy.types.Operator):  # noqa: N801
         self._scene = context.scene.name_full
         self._settings_text = json.dumps({**settings.as_dict(), **asked})
         self.stepper = measuring(
-            target_of(reference_of(fmqm), fmqm.bare_reference), list(dict.fromkeys(compared)), settings, **asked
+            target_of(reference_of(fmqm), fmqm.bare_reference),
+            list(dict.fromkeys(compared)),
+            settings,
+            **asked,
+            both=fmqm.settings.both,
         )
         return True
 
@@ -135,6 +140,8 @@ def _write_row(fmqm: FMQMScene, outcome: Outcome, settings_text: str) -> None:
     row.space = "" if placement is None else placement.label
     row.scores = "" if comparison is None else numbers_text(comparison.scores)
     row.stderr = "" if comparison is None or comparison.stderr is None else numbers_text(comparison.stderr)
+    row.reverse = "" if outcome.reverse is None else numbers_text(outcome.reverse)
+    row.trust = "" if outcome.trust is None else json.dumps(trust_dict(outcome.trust), allow_nan=False)
     row.patches = 0 if comparison is None else len(comparison.result.patches)
     row.samples = 0 if comparison is None else len(comparison.result.samples.positions)
     if comparison is not None and placement is not None and outcome.reference is not None:

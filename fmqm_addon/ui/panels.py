@@ -11,9 +11,10 @@ from bl_ui.utils import PresetPanel
 from ..blender.space import PLACE_LABELS
 from ..metric.score import COLUMNS
 from ..report.pair import SHOWN
+from ..report.trust import trust_lines
 from . import session
 from .measuring import why_not
-from .properties import FMQMItem, FMQMRow, row_scores, row_stderr
+from .properties import FMQMItem, FMQMRow, row_reverse, row_scores, row_stderr, row_trust
 from .results import EXPLAINED, active_row
 from .scene import FMQMScene
 
@@ -199,6 +200,7 @@ class FMQM_PT_settings(_Sidebar, bpy.types.Panel):  # noqa: N801
         column = layout.column()
         column.prop(settings, "space")
         column.prop(settings, "match_scale")
+        column.prop(settings, "both")
         column = layout.column(align=True)
         column.prop(settings, "seed")
         column.prop(settings, "repeats")
@@ -266,6 +268,31 @@ class FMQM_PT_results(_Sidebar, bpy.types.Panel):  # noqa: N801
         wrapped(note, context, NOT_SEEN)
 
 
+class FMQM_PT_trust(_Sidebar, bpy.types.Panel):  # noqa: N801
+    bl_idname = "FMQM_PT_trust"
+    bl_parent_id = "FMQM_PT_results"
+    bl_label = "Trust"
+    bl_description = "What is known of the chosen result: how far to believe its score"
+    bl_options: ClassVar = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        row = active_row(context.scene.fmqm)
+        return row is not None and bool(row.trust)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        row = active_row(context.scene.fmqm)
+        report = None if row is None else row_trust(row)
+        if report is None:
+            return
+        column = self.layout.column(align=True)
+        for line in trust_lines(report):
+            split = column.split(factor=0.5, align=True)
+            split.label(text=line.label[:1].upper() + line.label[1:])
+            # One value where both meshes have the same: the sidebar is narrow.
+            split.label(text=" / ".join(dict.fromkeys(line.values)), translate=False)
+
+
 def _draw_row(layout: bpy.types.UILayout, context: bpy.types.Context, fmqm: FMQMScene, row: FMQMRow) -> None:
     """All about the chosen row."""
     if row.error:
@@ -284,6 +311,11 @@ def _draw_row(layout: bpy.types.UILayout, context: bpy.types.Context, fmqm: FMQM
         label.operator("fmqm.sort_rows", text=EXPLAINED[name][0], emboss=False).column = name
         error = f" ± {stderr[name]:.4f}" if stderr else ""
         split.label(text=f"{scores[name]:.4f}{error}")
+    reverse = row_reverse(row)
+    if reverse is not None:
+        split = column.split(factor=0.5, align=True)
+        split.label(text="    FMQM Reversed")
+        split.label(text=f"{reverse['FMQM']:.4f}")
     reference = f"{row.reference_name} (no modifiers)" if row.bare_reference else row.reference_name
     for label, text in (
         ("Against", reference),
@@ -312,5 +344,6 @@ CLASSES = (
     FMQM_PT_settings,
     FMQM_PT_metric,
     FMQM_PT_results,
+    FMQM_PT_trust,
 )
 assert set(SHOWN) == set(COLUMNS)

@@ -11,18 +11,19 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
+from ..blender.assets import is_measured
 from ..blender.space import SPACES
 from ..metric.score import COLUMNS
 from ..metric.settings import FAST_SCORED_PATCHES, SETTING_NAMES, Settings
+from ..report.trust import Report
 
 SEED_LIMIT = 2**31 - 1  # of an IntProperty
 CUSTOM = "CUSTOM"
-ASSET_TYPES = ("MESH", "EMPTY")
 
 
 def is_asset(object_: bpy.types.Object) -> bool:
-    """Whether an object can be measured: a mesh, or an empty, which stands for the meshes below it."""
-    return object_.type in ASSET_TYPES
+    """Whether an object can be measured: it may show a surface, or it is an empty and stands for what hangs from it."""
+    return object_.type == "EMPTY" or is_measured(object_)
 
 
 def _can_be_picked(_: Any, object_: bpy.types.Object) -> bool:
@@ -34,12 +35,12 @@ class FMQMItem(bpy.types.PropertyGroup):
 
     object: PointerProperty(
         name="Object",
-        description="Mesh, or empty whose meshes count as one object",
+        description="Mesh, curve, surface, text or metaball, or an empty, below which all counts as one object",
         type=bpy.types.Object,
         poll=_can_be_picked,
     )
     collection: PointerProperty(
-        name="Collection", description="Collection whose meshes count as one object", type=bpy.types.Collection
+        name="Collection", description="Collection whose objects count as one", type=bpy.types.Collection
     )
 
 
@@ -70,6 +71,8 @@ class FMQMRow(bpy.types.PropertyGroup):
     error: StringProperty(name="Error", description="Why there is no score")
     space: StringProperty(name="Space", description="Where the two were compared")
     settings: StringProperty(name="Settings", description="Settings of the measurement, as JSON")
+    reverse: StringProperty(name="Reverse", description="Scores of the other direction, as JSON; empty: not measured")
+    trust: StringProperty(name="Trust", description="How far to trust the scores: facts with their units, as JSON")
     fingerprint: StringProperty(name="Fingerprint", description="Tells whether what was measured has changed since")
 
 
@@ -81,6 +84,17 @@ def row_scores(row: FMQMRow) -> dict[str, float] | None:
 def row_stderr(row: FMQMRow) -> dict[str, float] | None:
     """Standard errors of the scores over the seeds; None for one seed."""
     return _columns(row.stderr)
+
+
+def row_reverse(row: FMQMRow) -> dict[str, float] | None:
+    """Scores of the other direction, the compared as the reference; None where they were not measured."""
+    return _columns(row.reverse)
+
+
+def row_trust(row: FMQMRow) -> Report | None:
+    """The trust report of a row; None for a row with an error."""
+    report: Report | None = json.loads(row.trust) if row.trust else None
+    return report
 
 
 def numbers_text(values: Any) -> str:
@@ -231,11 +245,16 @@ class FMQMSettings(bpy.types.PropertyGroup):
         description="Undo a difference in size by a factor between units, such as 100, 1000 or 2.54",
         default=False,
     )
+    both: BoolProperty(
+        name="Both Directions",
+        description="Score the compared as the reference too, which sees what only it has. Takes twice as long",
+        default=False,
+    )
 
 
 # In the order in which operator presets save them; space and seed are the scene's, not a preset's.
 PRESET_PROPERTIES = tuple(
-    name for name in FMQMSettings.__annotations__ if name not in {"preset", "seed", "space", "match_scale"}
+    name for name in FMQMSettings.__annotations__ if name not in {"preset", "seed", "space", "match_scale", "both"}
 )
 _PAPER: dict[str, Any] = {
     **{name: getattr(Settings(), name) for name in SETTING_NAMES if name not in {"seed", "scored_patches"}},

@@ -14,11 +14,12 @@ from bpy.props import EnumProperty, StringProperty
 from .. import VERSION
 from ..metric.errors import FMQMError
 from ..metric.score import COLUMNS
+from ..metric.spatial import Floats
 from ..report.fields import save_fields
 from ..report.files import write_text
 from ..report.pair import SHOWN, PairScore, csv_text, json_text, table_text
 from . import session, watch
-from .properties import FMQMRow, row_scores, row_stderr
+from .properties import FMQMRow, row_reverse, row_scores, row_stderr, row_trust
 from .scene import FMQMScene
 
 # What an artist should know of each number: label, and what a low value looks like.
@@ -51,20 +52,25 @@ def active_row(fmqm: FMQMScene) -> FMQMRow | None:
 
 def pair_of(row: FMQMRow) -> PairScore:
     """A row as the reports want it."""
-    scores, stderr = row_scores(row), row_stderr(row)
     reference, target = watch.row_targets(row)
     return PairScore(
         reference=reference.label,
         distorted=target.label,
-        scores=None if scores is None else np.array([scores[name] for name in COLUMNS]),
-        stderr=None if stderr is None else np.array([stderr[name] for name in COLUMNS]),
+        scores=_array(row_scores(row)),
+        stderr=_array(row_stderr(row)),
         patches=row.patches or None,
         samples=row.samples or None,
         seconds=json.loads(row.stages or "{}"),
         warnings=tuple(row.warnings.splitlines()),
         error=row.error or None,
         space=row.space or None,
+        reverse=_array(row_reverse(row)),
+        trust=row_trust(row),
     )
+
+
+def _array(columns: dict[str, float] | None) -> Floats | None:
+    return None if columns is None else np.array([columns[name] for name in COLUMNS])
 
 
 def _has_rows(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
@@ -168,7 +174,7 @@ class FMQM_OT_save_results(bpy.types.Operator):  # noqa: N801
         name="Format",
         description="What is saved",
         items=[
-            ("json", "JSON", "Scores in full precision, with settings, times and warnings"),
+            ("json", "JSON", "Scores in full precision, with settings, times, warnings and trust reports"),
             ("csv", "CSV", "One row per result, for spreadsheets"),
             ("npz", "NPZ", "Samples, fields and patch scores of the chosen result, for numpy"),
         ],

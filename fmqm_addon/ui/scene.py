@@ -26,19 +26,19 @@ class FMQMScene(bpy.types.PropertyGroup):
         name="Reference Kind",
         description="What the reference is",
         items=[
-            ("OBJECT", "Object", "A mesh, or an empty with its meshes", "OBJECT_DATA", 0),
-            ("COLLECTION", "Collection", "All meshes of a collection", "OUTLINER_COLLECTION", 1),
+            ("OBJECT", "Object", "An object with a surface, or an empty with all below it", "OBJECT_DATA", 0),
+            ("COLLECTION", "Collection", "All objects of a collection", "OUTLINER_COLLECTION", 1),
         ],
     )
     reference: PointerProperty(
         name="Reference",
-        description="The original. An empty stands for all meshes below it",
+        description="The original. An empty stands for all below it",
         type=bpy.types.Object,
         poll=_can_be_picked,
     )
     reference_collection: PointerProperty(
         name="Reference Collection",
-        description="The original: all meshes of the collection as one object",
+        description="The original: all objects of the collection as one",
         type=bpy.types.Collection,
     )
     bare_reference: BoolProperty(

@@ -104,10 +104,11 @@ def textured(path: Path, name: str = "Textured") -> bpy.types.Material:
 
 
 def write_exr(path: Path, pixels: np.ndarray) -> Path:
-    """(H, W, 3) float32, row 0 at the top: an uncompressed OpenEXR. (Blender 4.5's own save encodes them.)"""
-    height, width, _ = pixels.shape
+    """(H, W, 3 or 4) float32, row 0 at the top: an uncompressed OpenEXR. (Blender 4.5's own save encodes them.)"""
+    height, width, count = pixels.shape
+    names = (b"A", b"B", b"G", b"R")[-count:]
     window = struct.pack("<4i", 0, 0, width - 1, height - 1)
-    channels = b"".join(name + b"\0" + struct.pack("<4i", 2, 0, 1, 1) for name in (b"B", b"G", b"R")) + b"\0"
+    channels = b"".join(name + b"\0" + struct.pack("<4i", 2, 0, 1, 1) for name in names) + b"\0"
     attributes = (
         (b"channels", b"chlist", channels), (b"compression", b"compression", b"\0"),
         (b"dataWindow", b"box2i", window), (b"displayWindow", b"box2i", window), (b"lineOrder", b"lineOrder", b"\0"),
@@ -117,7 +118,7 @@ def write_exr(path: Path, pixels: np.ndarray) -> Path:
     )  # fmt: skip
     header = struct.pack("<2i", 20000630, 2)
     header += b"".join(n + b"\0" + k + b"\0" + struct.pack("<i", len(v)) + v for n, k, v in attributes) + b"\0"
-    rows = [row[:, ::-1].T.astype("<f4").tobytes() for row in pixels]  # B, G, R, each the whole row
+    rows = [row[:, ::-1].T.astype("<f4").tobytes() for row in pixels]  # A, B, G, R, each the whole row
     first = len(header) + 8 * height
     offsets = b"".join(struct.pack("<Q", first + y * (8 + len(rows[0]))) for y in range(height))
     scanlines = b"".join(struct.pack("<2i", y, len(row)) + row for y, row in enumerate(rows))

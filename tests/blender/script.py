@@ -22,12 +22,23 @@ STAGES = ("load", "prepare", "fields", "features", "total")
 
 
 def score(
-    *arguments: object, command: tuple[str, ...] = (), env: Mapping[str, str] | None = None, cwd: Path | None = None
+    *arguments: object,
+    command: tuple[str, ...] = (),
+    env: Mapping[str, str] | None = None,
+    cwd: Path | None = None,
+    timeout: float | None = None,
 ) -> subprocess.CompletedProcess[str]:
     """Runs the script; in no case may it end in a traceback."""
     full = [*(command or (sys.executable, str(SCORE))), *(str(argument) for argument in arguments)]
     done = subprocess.run(
-        full, capture_output=True, text=True, encoding="utf-8", env={**os.environ, **(env or {})}, cwd=cwd, check=False
+        full,
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        env={**os.environ, **(env or {})},
+        cwd=cwd,
+        timeout=timeout,
+        check=False,
     )
     assert "Traceback" not in done.stderr and "Traceback" not in done.stdout, done.stderr
     return done
@@ -55,12 +66,13 @@ def numbers(pair: Mapping[str, Any]) -> list[Any]:
 
 
 def write_png(path: Path, pixels: np.ndarray) -> Path:
-    """(H, W, 3) uint8 or uint16, row 0 at the top: a PNG of 8 or 16 bits, from first principles."""
-    height, width, _ = pixels.shape
+    """(H, W, 1 to 4) uint8 or uint16, row 0 at the top: a PNG of 8 or 16 bits, from first principles."""
+    height, width, channels = pixels.shape
+    kind = {1: 0, 2: 4, 3: 2, 4: 6}[channels]
     rows = pixels.astype(pixels.dtype.newbyteorder(">")).tobytes()
     stride = len(rows) // height
     filtered = b"".join(b"\0" + rows[first : first + stride] for first in range(0, len(rows), stride))
-    header = struct.pack(">IIBBBBB", width, height, 8 * pixels.itemsize, 2, 0, 0, 0)
+    header = struct.pack(">IIBBBBB", width, height, 8 * pixels.itemsize, kind, 0, 0, 0)
     chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(filtered)), (b"IEND", b""))
     packed = (struct.pack(">I", len(d)) + k + d + struct.pack(">I", zlib.crc32(k + d)) for k, d in chunks)
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(packed))

@@ -243,9 +243,11 @@ def test_empties_and_collections_count_as_one(fmqm: ui.scene.FMQMScene, picture:
     assert [row.kind for row in fmqm.rows] == ["OBJECT", "COLLECTION", "OBJECT"]
 
 
-def test_an_error_is_one_rows(fmqm: ui.scene.FMQMScene, lods: list[bpy.types.Object], picture: Path) -> None:
+def test_an_error_is_one_rows(fmqm: ui.scene.FMQMScene, lods: list[bpy.types.Object]) -> None:
     bare = scenes.add("Bare", [(0, 0, 0)], [])
-    flat = scenes.cube("No UVs", uv=False, materials=[scenes.textured(picture)])
+    no_image = scenes.material("Blank")
+    scenes.image_node(no_image, None)
+    flat = scenes.cube("No Image", materials=[no_image])
     hollow = bpy.data.objects.new("Hollow", None)
     bpy.context.scene.collection.objects.link(hollow)
     gone = scenes.cube("Gone")
@@ -254,7 +256,7 @@ def test_an_error_is_one_rows(fmqm: ui.scene.FMQMScene, lods: list[bpy.types.Obj
     assert bpy.ops.fmqm.measure() == {"FINISHED"}
     errors = {row.name: row.error for row in fmqm.rows}
     assert "no faces" in errors["Bare"]
-    assert "UV map" in errors["No UVs"]
+    assert "holds no image" in errors["No Image"]
     assert "no mesh in it" in errors["Hollow"]
     assert "deleted" in errors["Gone"]
     assert not errors["Rock_LOD1"] and numbers(fmqm.rows[4])

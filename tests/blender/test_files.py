@@ -15,6 +15,7 @@ import pytest
 
 from fmqm_addon.blender import files
 from fmqm_addon.blender.files import SUFFIXES, load_mesh, split_spec
+from fmqm_addon.blender.material import Reading
 from fmqm_addon.blender.measure import Measurement
 from fmqm_addon.metric.color import Texture
 from fmqm_addon.metric.errors import FileError, FMQMError, MeshError
@@ -117,7 +118,7 @@ def test_relative_path(monkeys: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_given_texture_replaces_the_files_own(monkeys: Path) -> None:
     texture = Texture(scenes.noise(seed=9))
     for kind in ("glb", "ply"):
-        arrays = load_mesh(str(monkeys / f"monkey.{kind}"), texture)
+        arrays = load_mesh(str(monkeys / f"monkey.{kind}"), Reading(texture=texture))
         assert arrays.materials[0].color is texture and not arrays.warnings
 
 
@@ -126,7 +127,7 @@ def test_given_texture_needs_uvs(monkeys: Path, tmp_path: Path, kind: str) -> No
     scenes.cube("Bald", uv=False)
     path = scenes.export(tmp_path, kind)
     with pytest.raises(MeshError, match="no UV map") as caught:
-        load_mesh(str(path), Texture(PIXELS))
+        load_mesh(str(path), Reading(texture=Texture(PIXELS)))
     assert str(path) in str(caught.value)
 
 
@@ -366,7 +367,7 @@ def test_obj_without_its_image(monkeys: Path, tmp_path: Path) -> None:
     assert f"{tmp_path / 'image.png'}: the base-color image is missing" in assert_refused(
         path, monkeys / "monkey.obj", MeshError
     )
-    assert len(load_mesh(str(path), Texture(PIXELS)).triangles) == 968  # unless another is given
+    assert len(load_mesh(str(path), Reading(texture=Texture(PIXELS))).triangles) == 968  # unless another is given
 
 
 @pytest.mark.parametrize("kind", ["blend", "glb", "usda", "abc"])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What color a surface has: the right image, the right way up, encoded for display."""
+"""What of a material is read, what it wants of the mesh, and what is said of the rest. Colors: test_cycles.py."""
 
 from __future__ import annotations
 
@@ -9,12 +9,11 @@ import bpy
 import numpy as np
 import pytest
 
-from fmqm_addon.blender.bvh import BVHQuery
-from fmqm_addon.blender.material import SlotColor, TextureCache, load_texture, read_pixels, slot_color
+from fmqm_addon.blender.images import TextureCache
+from fmqm_addon.blender.material import Layer, Look, Reading, Unread, plain_look, read_look
 from fmqm_addon.blender.mesh import mesh_arrays
 from fmqm_addon.metric.color import PlainColor, Texture
-from fmqm_addon.metric.errors import FileError, MeshError
-from fmqm_addon.metric.surface import prepare_surface
+from fmqm_addon.metric.errors import MeshError
 
 from . import scenes
 
@@ -22,46 +21,114 @@ from . import scenes
 ENCODED = {0.0: 0.0, 0.002: 0.02584, 0.0031308: 0.04045, 0.18: 0.461356, 0.5: 0.735357, 1.0: 1.0}
 
 
-def look(material: bpy.types.Material | None) -> SlotColor:
-    return slot_color(material, TextureCache(), "Object")
+def look(material: bpy.types.Material | None, reading: Reading = Reading()) -> Look:  # noqa: B008
+    found = read_look(material, TextureCache(), reading)
+    assert isinstance(found, Look), found
+    return found
+
+
+def color(material: bpy.types.Material) -> object:
+    return look(material).material.color
 
 
 def loaded(tmp_path: Path, pixels: np.ndarray, name: str = "image.png") -> bpy.types.Image:
     return bpy.data.images.load(str(scenes.write_png(tmp_path / name, pixels)))
 
 
+def behind(material: bpy.types.Material, kind: str, start: bpy.types.NodeSocket | None = None) -> bpy.types.Node:
+    """A node of a kind before Base Color, fed by a socket."""
+    node = material.node_tree.nodes.new(f"ShaderNode{kind}")
+    if start is not None:
+        material.node_tree.links.new(start, node.inputs[0])
+    material.node_tree.links.new(node.outputs[0], scenes.base_color(material))
+    return node
+
+
 def test_image_that_feeds_base_color(tmp_path: Path) -> None:
     pixels = scenes.noise()
-    material = scenes.material()
+    material = scenes.material("Painted")
     scenes.image_node(material, loaded(tmp_path, scenes.noise(seed=5), "roughness.png"), link=False)
     scenes.image_node(material, loaded(tmp_path, pixels))
     seen = look(material)
-    assert isinstance(seen.color, Texture) and not seen.warnings
-    assert seen.color.pixels.dtype == np.uint8 and np.array_equal(seen.color.pixels, pixels)
+    assert isinstance(seen.material.color, Texture) and not seen.warnings and seen.material.alpha is None
+    assert (seen.material.name, seen.material.how, seen.material.uv) == ("Painted", "read", 0)
+    assert seen.material.color.pixels.dtype == np.uint8 and np.array_equal(seen.material.color.pixels, pixels)
+    assert seen.layers == (Layer("uv", ""),)
 
 
-def test_texture_of_another_socket_is_not_taken(tmp_path: Path) -> None:
+def test_texture_of_another_socket_is_not_taken_but_told(tmp_path: Path) -> None:
     material = scenes.material(color=(0.5, 0.18, 0.002))
     node = scenes.image_node(material, loaded(tmp_path, scenes.noise()), link=False)
     shader = scenes.base_color(material).node
     material.node_tree.links.new(node.outputs["Color"], shader.inputs["Roughness"])
-    assert isinstance(look(material).color, PlainColor)
+    seen = look(material)
+    assert isinstance(seen.material.color, PlainColor) and seen.layers == ()
+    assert [(image.role, image.name) for image in seen.material.images] == [("Roughness", "image.png")]
+
+
+def test_images_are_told_apart_by_role_and_content(tmp_path: Path) -> None:
+    """The normal map is reached through its node, the same file twice has one digest, a missing one none."""
+    facts = {}
+    for name, seed in (("first", 1), ("second", 2), ("again", 1)):
+        material = scenes.material(name)
+        tree, shader = material.node_tree, scenes.base_color(material).node
+        scenes.image_node(material, loaded(tmp_path, scenes.noise(seed=9), "base.png"))
+        normal = scenes.image_node(material, loaded(tmp_path, scenes.noise(8, seed), f"{name}.png"), link=False)
+        normal.image.colorspace_settings.name = "Non-Color"
+        convert = tree.nodes.new("ShaderNodeNormalMap")
+        tree.links.new(normal.outputs["Color"], convert.inputs["Color"])
+        tree.links.new(convert.outputs["Normal"], shader.inputs["Normal"])
+        (tmp_path / "gone.png").unlink(missing_ok=True)
+        gone = scenes.image_node(material, loaded(tmp_path, scenes.noise(), "gone.png"), link=False)
+        (tmp_path / "gone.png").unlink()
+        tree.links.new(gone.outputs["Color"], shader.inputs["Metallic"])
+        facts[name] = look(material).material.images
+    assert [image.role for image in facts["first"]] == ["base color", "Metallic", "Normal"]
+    base, gone, normal = facts["first"]
+    assert (base.width, base.height, base.color_space, base.missing) == (16, 16, "sRGB", False)
+    assert (normal.width, normal.color_space) == (8, "Non-Color") and normal.path == str(tmp_path / "first.png")
+    assert gone.missing and gone.digest == "" and gone.width == 0
+    assert normal.digest == facts["again"][2].digest != facts["second"][2].digest
+
+
+def test_an_image_that_only_other_sockets_use_is_not_decoded(tmp_path: Path) -> None:
+    material = scenes.material()
+    node = scenes.image_node(material, loaded(tmp_path, scenes.noise()), link=False)
+    material.node_tree.links.new(node.outputs["Color"], scenes.base_color(material).node.inputs["Roughness"])
+    look(material)
+    assert not node.image.has_data
 
 
 @pytest.mark.parametrize(("linear", "encoded"), ENCODED.items())
 def test_plain_color_is_encoded(linear: float, encoded: float) -> None:
     seen = look(scenes.material(color=(linear, 0.5, 0.0)))
-    assert seen.color.rgb == pytest.approx((encoded, ENCODED[0.5], 0.0), abs=1e-5)
-    assert seen.uv_map is None and not seen.warnings
+    assert seen.material.color.rgb == pytest.approx((encoded, ENCODED[0.5], 0.0), abs=1e-5)
+    assert seen.layers == () and not seen.warnings
 
 
-def test_no_principled_shader_takes_the_viewport_color() -> None:
+@pytest.mark.parametrize("strange", [float("nan"), float("inf"), -float("inf"), 1e38])
+def test_sockets_that_are_not_finite_give_finite_colors(strange: float) -> None:
+    material = scenes.material(color=(strange, 0.5, 0.0))
+    mix = behind(material, "MixRGB")
+    mix.inputs["Color1"].default_value = mix.inputs["Color2"].default_value = (strange, 1, 1, 1)
+    mix.inputs["Fac"].default_value = 0.5
+    rgb = np.array(look(material).material.color.rgb)
+    assert np.isfinite(rgb).all() and (rgb >= 0).all() and (rgb <= 1).all()
+
+
+def test_no_material_is_default_grey_with_a_warning() -> None:
+    seen = look(None)
+    assert seen.material.how == "none" and len(seen.warnings) == 1
+    assert seen.material.color.rgb == pytest.approx((0.906332,) * 3, abs=1e-5)  # 0.8 encoded
+
+
+def test_no_shader_takes_the_viewport_color() -> None:
     material = scenes.material("Toon")
     material.node_tree.nodes.clear()
     material.diffuse_color = (0.5, 0.18, 1.0, 1.0)
     seen = look(material)
-    assert seen.color.rgb == pytest.approx((ENCODED[0.5], ENCODED[0.18], 1.0), abs=1e-5)
-    assert len(seen.warnings) == 1 and "Toon" in seen.warnings[0]
+    assert seen.material.color.rgb == pytest.approx((ENCODED[0.5], ENCODED[0.18], 1.0), abs=1e-5)
+    assert seen.material.how == "plain" and len(seen.warnings) == 1 and "Toon" in seen.warnings[0]
 
 
 def test_of_two_shaders_the_one_at_the_output_counts() -> None:
@@ -70,7 +137,99 @@ def test_of_two_shaders_the_one_at_the_output_counts() -> None:
     other.inputs["Base Color"].default_value = (0.18, 0.18, 0.18, 1)
     output = material.node_tree.get_output_node("ALL")
     material.node_tree.links.new(other.outputs["BSDF"], output.inputs["Surface"])
-    assert look(material).color.rgb == pytest.approx((ENCODED[0.18],) * 3, abs=1e-5)
+    assert color(material).rgb == pytest.approx((ENCODED[0.18],) * 3, abs=1e-5)
+
+
+@pytest.mark.parametrize("kind", ["TexChecker", "TexNoise", "Gamma", "ValToRGB", "HueSaturation", "NewGeometry"])
+def test_other_nodes_are_left_to_the_baker(kind: str) -> None:
+    material = scenes.material()
+    node = behind(material, kind)
+    assert read_look(material, TextureCache(), Reading()) == Unread(node.name, "is not read")
+
+
+def test_what_is_not_read_of_images_is_left_to_the_baker(tmp_path: Path) -> None:
+    for number, change in enumerate(
+        (
+            lambda node: setattr(node, "projection", "BOX"),
+            lambda node: setattr(node.texture_mapping, "scale", (2, 2, 2)),
+            lambda node: setattr(node.image, "source", "SEQUENCE"),
+            lambda node: setattr(node.image.colorspace_settings, "name", "Filmic sRGB"),
+        )
+    ):
+        material = scenes.material()
+        node = scenes.image_node(material, loaded(tmp_path, scenes.noise(), f"{number}.png"))
+        change(node)
+        found = read_look(material, TextureCache(), Reading())
+        assert isinstance(found, Unread) and found.node == node.name, number
+
+
+def test_vectors_that_are_not_read_are_left_to_the_baker(tmp_path: Path) -> None:
+    for output in ("Generated", "Object", "Normal", "Camera", "Window", "Reflection"):
+        material = scenes.material()
+        node = scenes.image_node(material, loaded(tmp_path, scenes.noise()))
+        source = material.node_tree.nodes.new("ShaderNodeTexCoord")
+        material.node_tree.links.new(source.outputs[output], node.inputs["Vector"])
+        assert isinstance(read_look(material, TextureCache(), Reading()), Unread), output
+
+
+def test_a_mix_by_a_factor_that_varies_is_left_to_the_baker(tmp_path: Path) -> None:
+    material = scenes.material()
+    node = scenes.image_node(material, loaded(tmp_path, scenes.noise()), link=False)
+    mix = behind(material, "MixRGB", node.outputs["Color"])
+    found = read_look(material, TextureCache(), Reading())
+    assert isinstance(found, Unread) and (found.node, found.why) == (mix.name, "has a factor that varies")
+    assert [image.role for image in found.images] == ["base color"]
+
+
+def test_a_very_long_chain_is_left_to_the_baker() -> None:
+    """As is one that doubles at each step, which would take for ever."""
+    material = scenes.material()
+    start = material.node_tree.nodes.new("ShaderNodeVertexColor").outputs["Color"]
+    for _ in range(100):
+        mix = material.node_tree.nodes.new("ShaderNodeMixRGB")
+        material.node_tree.links.new(start, mix.inputs["Color1"])
+        material.node_tree.links.new(start, mix.inputs["Color2"])
+        start = mix.outputs["Color"]
+    material.node_tree.links.new(start, scenes.base_color(material))
+    found = read_look(material, TextureCache(), Reading())
+    assert isinstance(found, Unread) and "too many" in found.why
+
+
+def test_alpha_that_is_not_read_is_opaque_with_a_warning(tmp_path: Path) -> None:
+    material = scenes.material("Leaf")
+    scenes.image_node(material, loaded(tmp_path, scenes.noise()))
+    noise = material.node_tree.nodes.new("ShaderNodeTexNoise")
+    material.node_tree.links.new(noise.outputs[0], scenes.base_color(material).node.inputs["Alpha"])
+    seen = look(material)
+    assert seen.material.alpha is None and isinstance(seen.material.color, Texture)
+    assert len(seen.warnings) == 1 and "Leaf" in seen.warnings[0] and noise.name in seen.warnings[0]
+
+
+def test_missing_alpha_image_is_opaque(tmp_path: Path) -> None:
+    material = scenes.material(color=(0.5, 0.5, 0.5))
+    path = scenes.write_png(tmp_path / "alpha.png", scenes.noise())
+    node = scenes.image_node(material, bpy.data.images.load(str(path)), link=False)
+    path.unlink()
+    for output in ("Alpha", "Color"):
+        material.node_tree.links.new(node.outputs[output], scenes.base_color(material).node.inputs["Alpha"])
+        seen = look(material)
+        assert seen.material.alpha is None
+        assert [(image.role, image.missing) for image in seen.material.images] == [("alpha", True)]
+
+
+def test_plain_look_is_the_shader_s_own_color(tmp_path: Path) -> None:
+    material = scenes.material("Rock", (0.5, 0.18, 0.0))
+    behind(material, "TexChecker")
+    seen = plain_look(material, "material Rock: not read")
+    assert seen.material.color.rgb == pytest.approx((ENCODED[0.5], ENCODED[0.18], 0.0), abs=1e-5)
+    assert (seen.material.how, seen.layers, seen.warnings) == ("plain", (), ("material Rock: not read",))
+
+
+def test_given_texture_replaces_everything() -> None:
+    texture = Texture(scenes.noise())
+    for material in (None, scenes.material("Procedural")):
+        seen = look(material, Reading(texture=texture))
+        assert seen.material.color is texture and seen.material.how == "given" and not seen.warnings
 
 
 def two_uv_maps() -> bpy.types.Object:
@@ -121,29 +280,6 @@ def test_slots_of_one_object_use_their_own_uv_maps(tmp_path: Path) -> None:
     assert mesh_arrays([object_], "asset").corners == pytest.approx(1 - first.corners)
 
 
-def test_uv_map_that_the_mesh_lacks_is_named(tmp_path: Path) -> None:
-    material = scenes.material()
-    source = material.node_tree.nodes.new("ShaderNodeUVMap")
-    source.uv_map = "Lightmap"
-    image = scenes.image_node(material, loaded(tmp_path, scenes.noise()))
-    material.node_tree.links.new(source.outputs["UV"], image.inputs["Vector"])
-    with pytest.raises(MeshError, match="Owner: .*no UV map named Lightmap"):
-        mesh_arrays([scenes.square("Owner", materials=[material])], "asset")
-
-
-@pytest.mark.parametrize("extension", ["REPEAT", "EXTEND", "CLIP", "MIRROR"])
-@pytest.mark.parametrize(
-    ("interpolation", "wanted"), [("Linear", "linear"), ("Closest", "closest"), ("Cubic", "linear")]
-)
-def test_extension_and_interpolation(tmp_path: Path, extension: str, interpolation: str, wanted: str) -> None:
-    material = scenes.material()
-    node = scenes.image_node(material, loaded(tmp_path, scenes.noise()))
-    assert look(material).color.extension == "repeat" and look(material).color.interpolation == "linear"
-    node.extension, node.interpolation = extension, interpolation
-    color = look(material).color
-    assert (color.extension, color.interpolation) == (extension.lower(), wanted)
-
-
 def test_through_reroutes(tmp_path: Path) -> None:
     pixels = scenes.noise()
     material = scenes.material()
@@ -158,108 +294,7 @@ def test_through_reroutes(tmp_path: Path) -> None:
             start = reroute.outputs[0]
         tree.links.new(start, end)
     seen = look(material)
-    assert np.array_equal(seen.color.pixels, pixels) and seen.uv_map == "Second" and not seen.warnings
-
-
-def test_image_behind_another_node_is_taken_with_a_warning(tmp_path: Path) -> None:
-    pixels = scenes.noise()
-    material = scenes.material("Tinted")
-    tree = material.node_tree
-    node = scenes.image_node(material, loaded(tmp_path, pixels), link=False)
-    gamma = tree.nodes.new("ShaderNodeGamma")
-    tree.links.new(node.outputs["Color"], gamma.inputs["Color"])
-    tree.links.new(gamma.outputs["Color"], scenes.base_color(material))
-    seen = look(material)
-    assert np.array_equal(seen.color.pixels, pixels)
-    assert len(seen.warnings) == 1 and "Tinted" in seen.warnings[0]
-
-
-def test_base_color_without_any_image_takes_the_plain_one_with_a_warning() -> None:
-    material = scenes.material("Procedural", (0.5, 0.5, 0.5))
-    tree = material.node_tree
-    checker = tree.nodes.new("ShaderNodeTexChecker")
-    tree.links.new(checker.outputs["Color"], scenes.base_color(material))
-    seen = look(material)
-    assert seen.color.rgb == pytest.approx((ENCODED[0.5],) * 3, abs=1e-5)
-    assert len(seen.warnings) == 1 and "Procedural" in seen.warnings[0]
-
-
-def test_top_row_of_the_file_is_at_v_near_1(tmp_path: Path) -> None:
-    """From the PNG's rows to the color at a place on the surface."""
-    pixels = np.zeros((2, 4, 3), np.uint8)
-    pixels[0, 0], pixels[0, 3], pixels[1, 0], pixels[1, 3] = (255, 0, 0), (0, 255, 0), (0, 0, 255), (255, 255, 0)
-    path = scenes.write_png(tmp_path / "corners.png", pixels)
-    assert np.array_equal(load_texture(str(path)).pixels, pixels)
-    material = scenes.textured(path)
-    material.node_tree.nodes["Image Texture"].interpolation = "Closest"
-    surface = prepare_surface(mesh_arrays([scenes.square(materials=[material])], "asset"), BVHQuery)
-    corners = surface.frame.leave(surface.vertices)[surface.triangles].reshape(-1, 3)
-    triangle = np.repeat(np.arange(len(surface.triangles)), 3)
-    # a little inside the corner of the image, where the corner pixel is alone
-    inward = 0.9 * np.tile(np.eye(3), (len(surface.triangles), 1)) + 0.1 / 3
-    shown = surface.color_at(triangle, inward)
-    wanted = {(0, 1): (1, 0, 0), (1, 1): (0, 1, 0), (0, 0): (0, 0, 1), (1, 0): (1, 1, 0)}
-    for (x, y, _), color in zip(np.round(corners, 6).tolist(), shown, strict=True):
-        assert color == pytest.approx(wanted[x, y])
-
-
-def test_eight_bit_images_keep_their_encoded_values(tmp_path: Path) -> None:
-    """All 256 of them, whatever color space Blender takes them to be in."""
-    ramp = np.repeat(np.arange(256, dtype=np.uint8).reshape(16, 16, 1), 3, axis=2)
-    image = loaded(tmp_path, ramp)
-    for space in ("sRGB", "Non-Color"):
-        image.colorspace_settings.name = space
-        assert np.array_equal(read_pixels(image), ramp)
-
-
-def test_sixteen_bit_png_is_encoded_for_display(tmp_path: Path) -> None:
-    """Blender holds it as linear floats; the file's own encoded values must come back."""
-    values = np.random.default_rng(0).integers(0, 65536, (8, 8, 3)).astype(np.uint16)
-    values[0, 0], values[0, 1] = 0, 65535
-    image = loaded(tmp_path, values)
-    assert image.is_float
-    pixels = read_pixels(image)
-    assert pixels.dtype == np.float32 and pixels.min() >= 0 and pixels.max() <= 1
-    assert pixels == pytest.approx(values / 65535, abs=2e-4)
-
-
-def test_float_image_is_encoded_for_display(tmp_path: Path) -> None:
-    """An EXR holds linear light: the values by hand, and what is not in [0, 1] clipped."""
-    linear = [*ENCODED, -1.0, 7.0]
-    rows = np.repeat(np.array(linear, np.float32)[None, :, None], 3, axis=2)
-    image = bpy.data.images.load(str(scenes.write_exr(tmp_path / "light.exr", rows)))
-    assert image.is_float
-    pixels = read_pixels(image)
-    assert pixels.shape == (1, len(linear), 3)
-    assert pixels[0, :, 0] == pytest.approx([*ENCODED.values(), 0.0, 1.0], abs=1e-5)
-
-
-def test_pixels_that_are_not_finite_are_made_so() -> None:
-    image = bpy.data.images.new("light", 2, 1, float_buffer=True)
-    image.pixels.foreach_set(np.array([np.nan, np.inf, -np.inf, 1, 0.5, 0.5, 0.5, 1], np.float32))
-    pixels = read_pixels(image)
-    assert pixels[0] == pytest.approx(np.array([[0, 1, 0], [ENCODED[0.5]] * 3]), abs=1e-5)
-
-
-def test_packed_image_needs_no_file(tmp_path: Path) -> None:
-    pixels = scenes.noise()
-    image = loaded(tmp_path, pixels)
-    image.use_fake_user = True
-    image.pack()
-    (tmp_path / "image.png").unlink()
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "packed.blend"))
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "packed.blend"))
-    material = scenes.material()
-    scenes.image_node(material, bpy.data.images["image.png"])
-    assert np.array_equal(look(material).color.pixels, pixels)
-
-
-def test_image_made_in_blender() -> None:
-    image = bpy.data.images.new("generated", 4, 2)
-    image.generated_color = (1.0, 0.5, 0.0, 1.0)
-    pixels = read_pixels(image)
-    assert pixels.shape == (2, 4, 3)
-    assert (pixels == pixels[0, 0]).all() and pixels[0, 0, 0] == 255 and pixels[0, 0, 2] == 0
+    assert np.array_equal(seen.material.color.pixels, pixels) and seen.layers == (Layer("uv", "Second"),)
 
 
 def break_image(path: Path, how: str) -> None:
@@ -299,39 +334,32 @@ def test_missing_image_beside_a_blend_is_named_by_its_whole_path(tmp_path: Path)
 def test_texture_node_without_an_image_is_an_error_that_names_the_material() -> None:
     material = scenes.material("Unfinished")
     scenes.image_node(material, None)
-    with pytest.raises(MeshError, match="Object: material Unfinished: .*holds no image"):
+    with pytest.raises(MeshError, match="material Unfinished: .*holds no image"):
         look(material)
 
 
-@pytest.mark.parametrize("how", ["missing", "truncated", "empty", "text", "folder"])
-def test_given_texture_that_cannot_be_read(tmp_path: Path, how: str) -> None:
-    path = tmp_path / "given.png"
-    if how == "folder":
-        path.mkdir()
+@pytest.mark.parametrize("how", ["missing", "truncated", "none"])
+def test_magenta_stands_in_where_that_is_allowed(tmp_path: Path, how: str) -> None:
+    path = tmp_path / "image.png"
+    material = scenes.textured(scenes.write_png(path, scenes.noise()))
+    node = material.node_tree.nodes["Image Texture"]
+    if how == "none":
+        node.image = None
     else:
         break_image(path, how)
-    before = scenes.blocks()
-    with pytest.raises(FileError) as caught:
-        load_texture(str(path))
-    assert str(path) in str(caught.value) and "\n" not in str(caught.value)
-    assert scenes.blocks() == before
+        node.image.reload()
+    seen = look(material, Reading(stand_in=True))
+    assert seen.material.color.rgb == pytest.approx((1.0, 0.0, 1.0)) and seen.layers == ()
+    assert len(seen.warnings) == 1 and (str(path) in seen.warnings[0]) == (how != "none")
 
 
-def test_given_texture_leaves_nothing_behind(tmp_path: Path) -> None:
-    pixels = scenes.noise()
-    path = scenes.write_png(tmp_path / "given.png", pixels)
-    own = bpy.data.images.load(str(path))  # the user's, of the same file
-    before = scenes.blocks()
-    texture = load_texture(str(path))
-    assert np.array_equal(texture.pixels, pixels) and texture.extension == "repeat"
-    assert scenes.blocks() == before and np.array_equal(read_pixels(own), pixels)
-
-
-def test_one_image_is_read_once(tmp_path: Path) -> None:
+def test_one_material_is_read_once(tmp_path: Path) -> None:
+    """So that objects share it; and one image that two materials use."""
     cache = TextureCache()
     image = loaded(tmp_path, scenes.noise())
     materials = [scenes.material(name) for name in "AB"]
     for material in materials:
         scenes.image_node(material, image)
-    first, second = (slot_color(material, cache, "Object").color.pixels for material in materials)
-    assert first is second
+    first, second = (read_look(material, cache, Reading()) for material in materials)
+    assert read_look(materials[0], cache, Reading()) is first
+    assert first.material.color.pixels is second.material.color.pixels

@@ -13,12 +13,15 @@ import pytest
 from mathutils import Matrix
 
 from fmqm_addon.blender.bvh import BVHQuery
+from fmqm_addon.blender.material import Reading
 from fmqm_addon.blender.mesh import mesh_arrays
 from fmqm_addon.metric.color import Texture
 from fmqm_addon.metric.errors import MeshError
 from fmqm_addon.metric.surface import prepare_surface
 
 from . import scenes
+
+GIVEN = Reading(texture=Texture(scenes.noise()))
 
 
 def subdivided(name: str = "Cube", **options: object) -> bpy.types.Object:
@@ -31,7 +34,7 @@ def subdivided(name: str = "Cube", **options: object) -> bpy.types.Object:
 def test_quads_become_triangles_with_the_same_surface() -> None:
     arrays = mesh_arrays([scenes.cube()], "asset")
     assert arrays.positions.shape == (8, 3) and arrays.positions.dtype == np.float64
-    assert arrays.triangles.shape == (12, 3) and arrays.corners.shape == (12, 3, 2) and arrays.material.shape == (12,)
+    assert arrays.triangles.shape == (12, 3) and arrays.corners.shape == (12, 3, 0) and arrays.material.shape == (12,)
     assert scenes.area(arrays) == pytest.approx(24)
     assert arrays.name == "asset"
 
@@ -164,7 +167,7 @@ def test_the_given_texture_replaces_all_materials() -> None:
     scenes.image_node(broken, None)
     texture = Texture(scenes.noise())
     objects = [scenes.square("A", materials=[broken]), scenes.square("B")]
-    arrays = mesh_arrays(objects, "asset", texture)
+    arrays = mesh_arrays(objects, "asset", Reading(texture=texture))
     assert all(look.color is texture for look in arrays.materials) and not arrays.warnings
 
 
@@ -256,7 +259,7 @@ def test_hidden_object_is_named_as_the_user_knows_it() -> None:
     object_ = scenes.cube("Hidden", uv=False, materials=[textured()])
     off_in_viewports(object_)
     with pytest.raises(MeshError, match="^Hidden: .*no UV map"):
-        mesh_arrays([object_], "asset")
+        mesh_arrays([object_], "asset", GIVEN)
     bare = scenes.cube("Bare")
     off_in_viewports(bare)
     assert mesh_arrays([bare], "asset").warnings[0].startswith("Bare: ")
@@ -271,7 +274,7 @@ def test_nothing_stays_in_the_session(fails: bool, hidden: bool) -> None:
     users = object_.data.users
     if fails:
         with pytest.raises(MeshError):
-            mesh_arrays([object_], "asset")
+            mesh_arrays([object_], "asset", GIVEN)
     else:
         mesh_arrays([object_], "asset")
     assert scenes.blocks() == before
@@ -316,9 +319,19 @@ def test_an_object_without_faces_costs_only_itself() -> None:
     assert len(mesh_arrays(objects, "asset").triangles) == 2
 
 
-def test_image_without_uvs_is_an_error_that_names_the_object() -> None:
+def test_a_given_image_needs_uvs() -> None:
     with pytest.raises(MeshError, match="Bald: .*no UV map.*unwrap"):
-        mesh_arrays([scenes.square(), scenes.square("Bald", uv=False, materials=[textured()])], "asset")
+        mesh_arrays([scenes.square(), scenes.square("Bald", uv=False)], "asset", GIVEN)
+
+
+def test_a_material_that_wants_uvs_where_there_are_none_is_read_at_0() -> None:
+    """As Blender renders it; said once for all that lack them."""
+    made = textured()
+    bald = [scenes.square(f"Bald {number}", uv=False, materials=[made]) for number in range(5)]
+    arrays = mesh_arrays([scenes.square(materials=[made]), *bald], "asset")
+    assert arrays.corners[:2].any() and not arrays.corners[2:].any()
+    assert len(arrays.warnings) == 1
+    assert arrays.warnings[0].startswith("Bald 0, Bald 1 and 3 more: the mesh has no UV map, which material Textured")
 
 
 def test_uvs_that_are_not_finite_still_give_a_color() -> None:

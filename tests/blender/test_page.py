@@ -186,7 +186,10 @@ def test_missing_pillow_is_said_before_any_work(tmp_path: Path, monkeypatch: pyt
 
 
 def test_names_from_strangers_stay_text() -> None:
-    trust = {group: {HOSTILE: {"value": HOSTILE, "unit": HOSTILE}} for group in ("reference", "distorted", "pair")}
+    fact = {"value": HOSTILE, "unit": HOSTILE}
+    image = {"role": HOSTILE, "name": HOSTILE, "path": HOSTILE, "missing": True}
+    meshes = {group: {HOSTILE: fact, "images": {"value": [image], "unit": ""}} for group in ("reference", "distorted")}
+    trust = {**meshes, "pair": {HOSTILE: fact}}
     shown = Page(
         record(HOSTILE, reference=HOSTILE, warnings=[HOSTILE], trust=trust, pictures=costs(10, 1 << 20)),
         record(HOSTILE, score=None, id=HOSTILE * 2, reference=HOSTILE, error=HOSTILE),

@@ -13,8 +13,10 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from fmqm_addon.blender.files import load_mesh, measured_objects, open_file
-from fmqm_addon.blender.material import load_texture
+from fmqm_addon.blender.assets import scene_members
+from fmqm_addon.blender.files import load_mesh, open_file
+from fmqm_addon.blender.images import load_texture
+from fmqm_addon.blender.material import Reading
 from fmqm_addon.blender.measure import Measurement
 from fmqm_addon.blender.mesh import mesh_arrays
 from fmqm_addon.metric.errors import FileError
@@ -97,7 +99,10 @@ def test_real_asset_against_itself_scores_exactly_1(shared_data: Path, name: str
 def test_quads_with_a_given_texture_score_exactly_1(shared_data: Path) -> None:
     """spot's quads name no image; as triangles they are another surface, but nearly the same."""
     image = str(shared_data / "objpng" / "spot" / "spot.png")
-    quads = [load_mesh(str(shared_data / "spot" / "spot_quadrangulated.obj"), load_texture(image)) for _ in range(2)]
+    quads = [
+        load_mesh(str(shared_data / "spot" / "spot_quadrangulated.obj"), Reading(texture=load_texture(image)))
+        for _ in range(2)
+    ]
     measurement = prepared(quads[0], FAST)
     assert scores(measurement, quads[1]).tolist() == [1.0] * 5
     assert scores(measurement, load_mesh(str(model(shared_data, "spot"))))[-1] > 0.9
@@ -142,7 +147,9 @@ def test_another_format_is_the_same_mesh(fast: tuple[Path, MeshArrays, Measureme
     """PLY names no image; it gets the same one by hand."""
     path, mesh, measurement = fast
     open_file(str(path))
-    again = load_mesh(str(scenes.export(tmp_path, kind)), mesh.materials[0].color if kind == "ply" else None)
+    again = load_mesh(
+        str(scenes.export(tmp_path, kind)), Reading(texture=mesh.materials[0].color if kind == "ply" else None)
+    )
     mine = scores(measurement, again)
     print(mesh.name, kind, 1 - mine)
     assert (1 - mine <= SAME_CONTENT).all() and (mine <= 1).all()
@@ -214,7 +221,7 @@ def test_objects_moved_together(unmoved: tuple[Path, Path, np.ndarray], name: st
     meshes = []
     for path in paths:
         open_file(str(path))
-        (object_,) = measured_objects()
+        (object_,) = scene_members()
         bpy.context.view_layer.update()
         object_.matrix_world = MATRICES[name](diagonal) @ object_.matrix_world
         meshes.append(mesh_arrays([object_], path.name))

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from . import scenes
 from .script import (
     COLUMNS,
     SCORE,
@@ -31,7 +32,7 @@ from .script import (
 
 PAIR_KEYS = [
     "id", "reference", "distorted", *COLUMNS, "stderr", "patches", "samples", "seconds", "warnings", "error",
-    "settings", "fail_under",
+    "reverse", "trust", "settings", "fail_under",
 ]  # fmt: skip
 SETTING_FLAGS = [
     "samples", "patches", "scored-patches", "sigma", "radius", "gradient-radius", "normal-threshold",
@@ -105,7 +106,8 @@ def test_json_has_exactly_the_promised_keys(whole: Path) -> None:
         None,
         None,
     )
-    assert pair["warnings"] == [] and pair["patches"] == 20
+    assert pair["warnings"] == [] and pair["patches"] == 20 and pair["reverse"] is None
+    assert list(pair["trust"]) == ["reference", "distorted", "pair"]
     settings = document["settings"]
     assert (settings["samples"], settings["patches"], settings["color_units"]) == (3200, 20, 20)
     assert (settings["sigma"], settings["centers"], settings["scored_patches"]) == (0.05, "fps", None)
@@ -118,6 +120,54 @@ def test_json_numbers_have_full_precision(whole: Path) -> None:
         scores = dict(zip((*COLUMNS[1:], COLUMNS[0]), fields["patch_scores"].mean(axis=0).tolist(), strict=True))
     assert {name: pair[name] for name in COLUMNS} == scores
     assert all(0 < value < 1 for value in scores.values())
+
+
+def test_trust_report_says_what_was_given_and_read(whole: Path) -> None:
+    trust = read_json(whole / "all.json")["pairs"][0]["trust"]
+    for name in ("reference", "distorted"):
+        facts = {key: item["value"] for key, item in trust[name].items()}
+        assert facts["triangles"] == 24 * 12 * 2 and facts["watertight"] and facts["sign_in_doubt"] < 0.002
+        (image,) = facts["images"]
+        assert (image["role"], image["width"], image["height"]) == ("base color", 16, 16)
+        assert image["path"].endswith("a.png") and image["color_space"] == "sRGB" and not image["missing"]
+        assert facts["samples_by_material"] == {"surface": 1.0} and facts["colors_from"] == {"surface": "read"}
+        assert facts["uv_outside"] == facts["uv_overlapping"] == facts["uv_missing"] == 0
+        low, high = facts["box"]
+        assert low == pytest.approx([-1.4, -0.4, -1.4], abs=0.15) and high == pytest.approx([1.4, 0.4, 1.4], abs=0.15)
+    pair = {key: item["value"] for key, item in trust["pair"].items()}
+    assert (pair["seed"], pair["space"], pair["size_divided_by"], pair["flipped"]) == (0, "world", 1.0, 0)
+    assert pair["settings"]["samples"] == 3200 and pair["size"] == pytest.approx(1, abs=0.1)
+    assert pair["standard_error"] is None and "seed" in trust["pair"]["standard_error"]["why"]
+
+
+def test_verbose_prints_the_report_below_the_scores(assets: Path) -> None:
+    done = score("ref.obj", "ref.obj", "repainted.obj", *SMALL, "--verbose", "--quiet", cwd=assets)
+    assert done.returncode == 0
+    scores, *reports = done.stdout.split("\n\n")
+    assert len(scores.splitlines()) == 3
+    assert [report.splitlines()[0] for report in reports] == [
+        f"{n} against ref.obj" for n in ("ref.obj", "repainted.obj")
+    ]
+    for report, image in zip(reports, ("a.png", "b.png"), strict=True):
+        assert re.search(r"^triangles +576 +576  triangles$", report, re.MULTILINE)
+        assert re.search(rf"^base color, distorted +{image}, 16 x 16, sRGB$", report, re.MULTILINE)
+
+
+def test_both_directions(assets: Path, tmp_path: Path) -> None:
+    """The other direction is the score of the two files given the other way round."""
+    out = ("--json", tmp_path / "j", "--csv", tmp_path / "c", "--quiet")
+    done = score("ref.obj", "shaken.obj", "nowhere.obj", *SMALL, "--both", *out, cwd=assets)
+    assert done.returncode == 1
+    both, failed = read_json(tmp_path / "j")["pairs"]
+    assert failed["reverse"] is None
+    header, row, empty = (line.split() for line in done.stdout.replace("reverse FMQM", "reverse").splitlines())
+    assert header[-1] == "reverse" and row[-1] == f"{both['reverse']['FMQM']:.4f}" and empty[1:] == ["-"] * 6
+    first, last = csv.DictReader((tmp_path / "c").read_text(encoding="utf-8").splitlines())
+    assert [first[f"reverse {name}"] for name in COLUMNS] == [repr(value) for value in numbers(both["reverse"])]
+    assert {last[f"reverse {name}"] for name in COLUMNS} == {""}
+    assert score("shaken.obj", "ref.obj", *SMALL, *out, cwd=assets).returncode == 0
+    assert numbers(both["reverse"]) == numbers(read_json(tmp_path / "j")["pairs"][0])
+    assert numbers(both) != numbers(both["reverse"])
 
 
 def test_seconds_add_up(whole: Path) -> None:
@@ -310,6 +360,7 @@ WRONG = [
     ("gradient-radius", "-1"), ("gradient-radius", "nan"), ("normal-threshold", "1.5"), ("normal-threshold", "nan"),
     ("tangent-threshold", "-0.1"), ("color-units", "0"), ("centers", "sobol"), ("color-space", "hsv"),
     ("pooling", "median"), ("seed", "-1"), ("seed", "x"), ("seed", str(2**63)), ("preset", "slow"), ("repeats", "0"),
+    ("bake", "-1"), ("bake", "20000"), ("bake", "x"), ("max-image-side", "0"), ("max-image-bytes", "0"),
     ("fail-under", "2"), ("fail-under", "-0.1"), ("fail-under", "nan"), ("save-fields", "fields.txt"),
 ]  # fmt: skip
 
@@ -378,6 +429,42 @@ def test_without_an_image_there_is_a_warning(assets: Path, tmp_path: Path) -> No
     assert "bare" in warning and "grey" in warning and warning in one_line(done.stderr)
 
 
+def test_bake_lets_a_missing_image_be_magenta(assets: Path, tmp_path: Path) -> None:
+    out = (*SMALL, "--quiet", "--json", tmp_path / "j")
+    assert score("ref.obj", "broken.obj", *out, cwd=assets).returncode == 1
+    done = score("ref.obj", "broken.obj", *out, "--bake", 32, cwd=assets)
+    assert done.returncode == 0, done.stderr
+    (pair,) = read_json(tmp_path / "j")["pairs"]
+    assert pair["geoSSIM"] == 1 and pair["colorSSIM"] < 0.9
+    assert any("nowhere.png" in warning for warning in pair["warnings"])
+    assert pair["trust"]["distorted"]["images"]["value"][0]["missing"] is True
+
+
+def test_bake_sets_the_size_or_forbids_it(tmp_path: Path) -> None:
+    import bpy
+
+    made = scenes.material("Marbled")
+    noise_node = made.node_tree.nodes.new("ShaderNodeTexNoise")
+    made.node_tree.links.new(noise_node.outputs["Color"], scenes.base_color(made))
+    scenes.cube(materials=[made])
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "cube.blend"))
+    for size, how in ((32, "baked"), (0, "plain")):
+        flags = (*SMALL, "--bake", size, "--json", tmp_path / "j", "--quiet")
+        assert score("cube.blend", "cube.blend", *flags, cwd=tmp_path).returncode == 0
+        (pair,) = read_json(tmp_path / "j")["pairs"]
+        assert numbers(pair) == [1.0] * 5
+        assert pair["trust"]["reference"]["colors_from"]["value"] == {"Marbled": how}
+        assert pair["trust"]["pair"]["baked_at"]["value"] == size
+        assert any("Marbled" in warning for warning in pair["warnings"])
+
+
+@pytest.mark.parametrize("limit", [("--max-image-side", 15), ("--max-image-bytes", 1023)])
+def test_images_beyond_the_limits_are_refused(assets: Path, limit: tuple[str, int]) -> None:
+    done = score("ref.obj", "ref.obj", *SMALL, *limit, "--quiet", cwd=assets)
+    assert done.returncode == 1 and "a.png" in said(done.stderr)[0]
+    assert score("ref.obj", "ref.obj", *SMALL, limit[0], limit[1] + 1, "--quiet", cwd=assets).returncode == 0
+
+
 @pytest.mark.parametrize("flag", ["--texture", "--ref-texture"])
 def test_given_texture_that_cannot_be_read(assets: Path, flag: str) -> None:
     done = score("ref.obj", "shaken.obj", flag, "nowhere.png", *SMALL, "--quiet", cwd=assets)
@@ -407,7 +494,7 @@ def test_a_bad_file_costs_only_itself(assets: Path, whole: Path, tmp_path: Path)
         pair = pairs[name]
         assert name in pair["error"] and pair["error"] in line and "\n" not in pair["error"]
         assert keys(pair) == PAIR_KEYS and numbers(pair) == [None] * 5
-        assert pair["stderr"] is pair["patches"] is pair["samples"] is None
+        assert pair["stderr"] is pair["patches"] is pair["samples"] is pair["trust"] is None
         row = rows[names.index(name)]
         assert row["error"] == pair["error"] and {row[column] for column in COLUMNS} == {""}
         assert table[names.index(name)].split() == [name, *"-----"]

@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from fmqm_addon.blender.space import APART, Placed, misfit, place, place_counts, unit_factor
+from fmqm_addon.blender.space import APART, Placed, misfit, moved, place, place_counts, unit_factor
 from fmqm_addon.metric.color import PlainColor
 from fmqm_addon.metric.errors import MeshError
 from fmqm_addon.metric.surface import MeshArrays
@@ -53,6 +55,79 @@ def test_auto_stays_in_the_world_without_a_far_better_fit() -> None:
     placement = place(asset(at()), asset(at(0.5), shift=0.2))
     assert placement.place == "world" and not placement.notes
     assert "differ by" in placement.warnings[0]
+
+
+def turned(degrees: float) -> np.ndarray:
+    """(4, 4) about X."""
+    sine, cosine = np.sin(np.radians(degrees)), np.cos(np.radians(degrees))
+    return np.array([(1, 0, 0, 0), (0, cosine, -sine, 0), (0, sine, cosine, 0), (0, 0, 0, 1)])
+
+
+def applied(placed: Placed, matrix: np.ndarray, name: str = "lod") -> Placed:
+    """The same place in the world of another shape, as files that apply a turn have it."""
+    return Placed(replace(moved(placed.mesh, matrix), name=name), placed.origin)
+
+
+@pytest.mark.parametrize("degrees", [90, -90, 180])
+@pytest.mark.parametrize("matrix", [at(), at(1, 2, 3)], ids=["at the origin", "elsewhere"])
+def test_auto_turns_about_x(degrees: int, matrix: np.ndarray) -> None:
+    """The file applied a turn that the reference's has not."""
+    reference = asset(matrix)
+    whole = Placed(reference.world(), at())
+    placement = place(reference, applied(whole, turned(-degrees)))
+    assert (placement.place, placement.turn) == ("world", degrees)
+    np.testing.assert_allclose(placement.mesh.positions, reference.world().positions, atol=1e-12)
+    assert f"turned by {degrees} degrees about X" in placement.label
+    assert placement.notes == (
+        f"lod: compared turned by {degrees} degrees about X, since its axes differ from the reference's",
+    )
+    assert not placement.warnings and place_counts(placement.label)
+
+
+def test_auto_turns_what_stands_beside() -> None:
+    """Its origin was moved after the import."""
+    reference = asset(at(1, 2, 3))
+    placement = place(reference, applied(asset(at(7, 8, 9)), turned(90)))
+    assert (placement.place, placement.turn) == ("location", -90)
+    np.testing.assert_allclose(placement.mesh.positions, reference.world().positions, atol=1e-12)
+    assert not place_counts(placement.label)
+
+
+@pytest.mark.parametrize("degrees", [90, -90])
+def test_upside_down_has_the_same_box(degrees: int) -> None:
+    """Symmetric boxes: only where the surface lies in them tells 90 degrees from -90."""
+    corners = [(x, y, z) for x in (-1.0, 1) for y in (-1.0, 1) for z in (-3.0, 3)]
+    positions = np.array([*corners, (0, 0.5, 2), (0.4, 0.1, 2), (0, 0, 2.9)])
+    triangles = np.array([(0, 3, 5), (1, 2, 7), (4, 6, 1), (8, 9, 10)])
+    mesh = replace(asset(at()).mesh, positions=positions, triangles=triangles)
+    reference = Placed(mesh, at())
+    placement = place(reference, applied(reference, turned(-degrees)))
+    assert placement.turn == degrees
+    np.testing.assert_allclose(placement.mesh.positions, positions, atol=1e-12)
+
+
+@pytest.mark.parametrize("degrees", [90, 180, 45])
+def test_a_turn_that_the_boxes_do_not_show_stays(degrees: int) -> None:
+    """A cube, and what no quarter turn mends."""
+    corners = np.array([(x, y, z) for x in (-1.0, 1) for y in (-1.0, 1) for z in (-1.0, 1)])
+    mesh = replace(asset(at()).mesh, positions=corners, triangles=np.array([(0, 3, 5), (1, 2, 7), (4, 6, 1)]))
+    reference = Placed(mesh, at())
+    placement = place(reference, applied(reference, turned(degrees)))
+    assert (placement.place, placement.turn) == ("world", 0)
+
+
+@pytest.mark.parametrize("space", ["world", "local"])
+def test_only_auto_turns(space: str) -> None:
+    assert place(asset(at()), applied(asset(at()), turned(90)), space).turn == 0
+
+
+def test_a_turn_and_other_units() -> None:
+    reference = asset(at())
+    placement = place(reference, applied(asset(at(), scale=100), turned(90)), match_scale=True)
+    assert placement.label == "world, turned by -90 degrees about X, size / 100"
+    np.testing.assert_allclose(placement.mesh.positions, reference.mesh.positions, atol=1e-12)
+    there = placement.mesh.positions @ placement.to_world[:3, :3].T
+    np.testing.assert_allclose(there, applied(asset(at(), scale=100), turned(90)).mesh.positions, atol=1e-9)
 
 
 @pytest.mark.parametrize("space", ["auto", "world", "local"])

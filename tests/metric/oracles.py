@@ -196,14 +196,25 @@ def grow_with_sets(
 # --- color ------------------------------------------------------------------------------------------------
 
 
+def basis(distance: Fraction, reach: int) -> Fraction:
+    """The hat of bilinear interpolation (reach 1) or the uniform cubic B-spline (reach 2), around 0."""
+    x = abs(distance)
+    if reach == 1:
+        return max(1 - x, Fraction(0))
+    if x < 1:
+        return Fraction(2, 3) - x**2 + x**3 / 2
+    return max(2 - x, Fraction(0)) ** 3 / 6
+
+
 def texture_color(texture: Texture, u: float, v: float) -> list[float]:
-    """One lookup, in exact rational arithmetic: i = u W - 0.5, j = (1 - v) H - 0.5, four pixels."""
+    """One lookup, in exact rational arithmetic: i = u W - 0.5, j = (1 - v) H - 0.5."""
     height, width = texture.pixels.shape[:2]
-    if texture.extension == "clip" and not (-1e-9 <= u <= 1 + 1e-9 and -1e-9 <= v <= 1 + 1e-9):
-        return [0.0, 0.0, 0.0]
     i, j = Fraction(u) * width - Fraction(1, 2), (1 - Fraction(v)) * height - Fraction(1, 2)
 
     def pixel(column: int, row: int) -> list[Fraction]:
+        if texture.extension == "clip" and not (0 <= column < width and 0 <= row < height):
+            return [Fraction(0)] * 3
+
         def wrap(index: int, size: int) -> int:
             if texture.extension == "repeat":
                 return index % size
@@ -217,15 +228,12 @@ def texture_color(texture: Texture, u: float, v: float) -> list[float]:
 
     if texture.interpolation == "closest":
         return [float(x) for x in pixel(math.floor(i + Fraction(1, 2)), math.ceil(j + Fraction(1, 2)) - 1)]
-    left, top = math.floor(i), math.floor(j)
+    reach = 1 if texture.interpolation == "linear" else 2
     color = [Fraction(0)] * 3
-    for column, row, weight in (
-        (left, top, (left + 1 - i) * (top + 1 - j)),
-        (left + 1, top, (i - left) * (top + 1 - j)),
-        (left, top + 1, (left + 1 - i) * (j - top)),
-        (left + 1, top + 1, (i - left) * (j - top)),
-    ):
-        color = [x + weight * y for x, y in zip(color, pixel(column, row), strict=True)]
+    for column in range(math.floor(i) - reach, math.floor(i) + reach + 2):
+        for row in range(math.floor(j) - reach, math.floor(j) + reach + 2):
+            weight = basis(i - column, reach) * basis(j - row, reach)
+            color = [x + weight * y for x, y in zip(color, pixel(column, row), strict=True)]
     return [float(x) for x in color]
 
 

@@ -11,8 +11,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fmqm_addon.metric import fields
 from fmqm_addon.metric.color import PlainColor
-from fmqm_addon.metric.fields import Fields, _coarse_to_fine, _guide, count_crossings, evaluate_fields
+from fmqm_addon.metric.fields import (
+    Fields,
+    _coarse_to_fine,
+    _guide,
+    count_crossings,
+    count_crossings_of_all,
+    evaluate_fields,
+)
 from fmqm_addon.metric.spatial import Floats, Ints, morton_order
 from fmqm_addon.metric.surface import MeshArrays, Surface, prepare_surface
 
@@ -209,3 +217,54 @@ def test_ties_on_edges_do_not_depend_on_the_order_of_triangles(seed: int) -> Non
     above = np.abs(points[:, 1]) < (points[:, 2] - 0.5) / 2 * 0.9  # nearest to the edge itself
     assert above.any()
     np.testing.assert_array_equal(found[0].ncf[above, 0] == 1, points[above, 1] < 0)
+
+
+def soup(count: int, seed: int) -> tuple[Floats, Ints]:
+    """Triangles across the whole unit cube."""
+    return np.random.default_rng(seed).random((3 * count, 3)), np.arange(3 * count).reshape(-1, 3)
+
+
+@given(seeds, st.integers(1, 60))
+def test_crossings_without_a_tree(seed: int, count: int) -> None:
+    shape = surface(soup(count, seed))
+    rng = np.random.default_rng(seed)
+    directions = rng.normal(size=(20, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    origins = rng.normal(0, 0.3, (20, 3))
+    wanted = count_crossings(shape, origins, directions)
+    assert count_crossings_of_all(shape, origins, directions).tolist() == wanted.tolist()
+
+
+@pytest.mark.parametrize(("count", "without_a_tree"), [(20, False), (800, True)])
+def test_only_a_soup_is_tested_without_a_tree(
+    monkeypatch: pytest.MonkeyPatch, count: int, without_a_tree: bool
+) -> None:
+    """And has the same signs, but where a ray crosses two triangles within RAY_STEP."""
+    shape = surface(soup(count, seed=1))
+    points = np.random.default_rng(2).uniform(-0.2, 0.2, (50, 3))
+    asked: list[int] = []
+
+    def counted(*arguments: Surface | Floats) -> Ints:
+        asked.append(1)
+        return count_crossings_of_all(*arguments)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(fields, "count_crossings_of_all", counted)
+    found = fields_at(shape, points)
+    assert bool(asked) == without_a_tree
+    monkeypatch.setattr(fields, "_SOUP_CROSSINGS", np.inf)
+    by_tree = fields_at(shape, points)
+    assert np.array_equal(np.abs(found.sdf), np.abs(by_tree.sdf))
+    assert np.count_nonzero(found.sdf != by_tree.sdf) <= 2
+
+
+def test_the_hub_of_a_fan_is_settled_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many triangles meet at a vertex: a few at a time, and the same ones are chosen."""
+    around = np.linspace(0, 2 * np.pi, 40, endpoint=False)
+    rim = np.stack([np.cos(around), np.sin(around), 0 * around], axis=1)
+    k = np.arange(1, 41)
+    shape = surface((np.concatenate([[[0, 0, 1]], rim]), np.stack([0 * k, k, k % 40 + 1], axis=1)), (texture(),))
+    points = np.random.default_rng(0).normal(0, 0.5, (200, 3))
+    whole = fields_at(shape, points)
+    monkeypatch.setattr(fields, "_CANDIDATES", 1)
+    parts = fields_at(shape, points)
+    assert np.array_equal(whole.triangle, parts.triangle) and np.array_equal(whole.nearest, parts.nearest)

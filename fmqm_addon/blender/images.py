@@ -1,0 +1,353 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pixels of Blender's images, as Cycles would sample them, and facts about images that nobody decodes."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import os
+import weakref
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..metric.color import ImageFacts, Texture, encode_srgb
+from ..metric.errors import FileError, MeshError
+from .headers import DEFAULT_LIMITS, Header, Limits, file_header, read_header
+
+LINEAR_SPACES = frozenset({"Non-Color", "Linear Rec.709", "scene_linear"})
+BRIGHTEST = 1e6  # linear light in float images is kept within this, so that nothing made of it overflows
+_LIGHT_FORMATS = frozenset({"OPEN_EXR", "OPEN_EXR_MULTILAYER", "HDR", "DPX", "CINEON"})  # hold linear light
+_BLOCK = 2**18  # floats that are converted at a time: what a processor's cache holds
+
+
+@dataclass(frozen=True)
+class Pixels:
+    """What an image holds.
+
+    Attributes:
+        values: (H, W, 3 or 4) uint8, or float32 within BRIGHTEST; row 0 at the top; a fourth channel is alpha.
+        linear: the values are linear light, not encoded for display.
+        associated: the colors are multiplied by alpha.
+        unusual: the colors are not what Cycles samples: how it treats alpha depends here on how the file came to
+            Blender, and on Blender's version.
+    """
+
+    values: NDArray[np.uint8] | NDArray[np.float32]
+    linear: bool
+    associated: bool
+    unusual: bool
+
+
+# Pixels that were read and that some asset may still hold, by content and by how Blender reads it.
+_held: dict[tuple[str, str, str, bool], tuple[weakref.ref[NDArray[Any]], tuple[bool, bool, bool]]] = {}
+
+
+class TextureCache:
+    """What was read of an asset's images and materials: once for all its slots and objects."""
+
+    def __init__(self) -> None:
+        self._pixels: dict[tuple[int, int], Pixels | None] = {}
+        self._digests: dict[int, str] = {}
+        self.looks: dict[int, Any] = {}  # by material.read_look alone
+
+    def pixels(self, image: bpy.types.Image, limits: Limits) -> Pixels | None:
+        """As read_pixels; what another asset still holds of the same content is shared."""
+        return self._once((image.as_pointer(), 0), lambda: self._shared(image, limits))
+
+    def tile(self, image: bpy.types.Image, number: int, limits: Limits) -> Pixels | None:
+        """As read_tile."""
+        return self._once((image.as_pointer(), number), lambda: read_tile(image, number, limits))
+
+    def facts(self, image: bpy.types.Image, role: str) -> ImageFacts:
+        """As image_facts, with the content looked through once."""
+        return image_facts(image, role, self._digest(image))
+
+    def _digest(self, image: bpy.types.Image) -> str:
+        key = image.as_pointer()
+        if key not in self._digests:
+            self._digests[key] = image_digest(image)
+        return self._digests[key]
+
+    def _shared(self, image: bpy.types.Image, limits: Limits) -> Pixels | None:
+        """LODs mostly carry the reference's own images: decoding and keeping them again would cost twice."""
+        if image.source != "FILE" or image.is_dirty or not self._digest(image):
+            return read_pixels(image, limits)
+        space, packed = image.colorspace_settings.name, image.packed_file is not None
+        key = (self._digest(image), space, image.alpha_mode, packed)
+        held = _held.get(key)
+        values = None if held is None else held[0]()
+        if held is not None and values is not None:
+            check_limits(image, limits)
+            return Pixels(values, *held[1])
+        pixels = read_pixels(image, limits)
+        if pixels is not None:
+            _held[key] = weakref.ref(pixels.values), (pixels.linear, pixels.associated, pixels.unusual)
+        return pixels
+
+    def _once(self, key: tuple[int, int], read: Callable[[], Pixels | None]) -> Pixels | None:
+        if key not in self._pixels:
+            self._pixels[key] = read()
+        return self._pixels[key]
+
+
+def read_pixels(image: bpy.types.Image, limits: Limits = DEFAULT_LIMITS) -> Pixels | None:
+    """The pixels of an image that is no UDIM set; None where it is missing or broken. Only what was decoded for this
+    is given back to Blender: freeing other buffers would erase unsaved painting.
+
+    Raises:
+        MeshError: the image promises more than the limits; nothing was decoded.
+    """
+    check_limits(image, limits)
+    was_there = image.has_data
+    try:
+        width, height = image.size
+        if not width or not height:
+            return None
+        values: NDArray[np.float32] = np.empty(width * height * image.channels, np.float32)
+        image.pixels.foreach_get(values)
+        values = values.reshape(height, width, image.channels)
+        return _float_pixels(image, values) if image.is_float else _byte_pixels(image, values)
+    finally:
+        if not was_there and image.source == "FILE" and not image.is_dirty:
+            image.buffers_free()
+
+
+def _float_pixels(image: bpy.types.Image, values: NDArray[np.float32]) -> Pixels:
+    """Blender holds floats as linear light, the colors multiplied by alpha. Works in place: they are large."""
+    for top in range(len(values) // 2):
+        values[[top, -1 - top]] = values[[-1 - top, top]]
+    np.nan_to_num(values, copy=False, nan=0.0, posinf=BRIGHTEST, neginf=-BRIGHTEST)
+    np.clip(values, -BRIGHTEST, BRIGHTEST, out=values)
+    if values.shape[2] < 3:
+        values = np.repeat(values[:, :, :1], 3, axis=2)
+    has_alpha = _has_alpha(image, values)
+    if values.shape[2] == 4:
+        values[:, :, 3] = np.clip(values[:, :, 3], 0, 1) if has_alpha else 1
+    associated = has_alpha and _associates(image)
+    is_light = image.file_format in _LIGHT_FORMATS
+    # Of files, Cycles samples 16-bit integers as they are encoded; of what Blender holds, as linear light.
+    encoded = image.source == "FILE" and not (image.packed_file or image.is_dirty or is_light or is_linear(image))
+    usual = is_light if image.alpha_mode == "PREMUL" else encoded
+    if encoded:
+        for row in values:
+            alpha = np.where(row[:, 3:] > 0, row[:, 3:], 1) if associated else 1
+            row[:, :3] = encode_srgb(row[:, :3] / alpha) * alpha
+    return Pixels(values, linear=not encoded, associated=associated, unusual=associated and not usual)
+
+
+def _byte_pixels(image: bpy.types.Image, values: NDArray[np.float32]) -> Pixels:
+    """The values are the file's bytes / 255; kept are those, at a quarter of the size."""
+    height, width, depth = values.shape
+    has_alpha = _has_alpha(image, values)
+    associated = has_alpha and _associates(image)
+    result: NDArray[np.uint8] = np.empty((height, width, 4 if has_alpha else 3), np.uint8)
+    upwards = result[::-1]
+    for rows in _row_blocks(values):
+        values[rows] *= 255
+        values[rows] += 0.5
+        block = values[rows].astype(np.uint8)
+        upwards[rows] = block[:, :, : result.shape[2]] if depth >= 3 else block[:, :, :1]
+        if associated:  # rounded down, as Cycles does
+            color = upwards[rows, :, :3]
+            color[...] = color.astype(np.uint16) * block[:, :, 3:] // 255
+    grey = associated and not image.packed_file and _is_grey_with_alpha(image)
+    unusual = associated and (image.alpha_mode == "PREMUL" or grey)
+    return Pixels(result, linear=is_linear(image), associated=associated, unusual=unusual)
+
+
+def _has_alpha(image: bpy.types.Image, values: NDArray[np.float32]) -> bool:
+    """Whether an image's alpha counts and is somewhere below 1."""
+    if values.shape[2] < 4 or image.alpha_mode == "NONE":
+        return False
+    return any(values[rows, :, 3].min() < 1 for rows in _row_blocks(values))
+
+
+def _row_blocks(values: NDArray[Any]) -> list[slice]:
+    """The rows of an image in blocks that are small beside it, where it is large."""
+    height, width, depth = values.shape
+    step = max(1, _BLOCK // (width * depth))
+    return [slice(first, first + step) for first in range(0, height, step)]
+
+
+def is_linear(image: bpy.types.Image) -> bool:
+    """Whether the values of a byte image are linear light."""
+    return image.colorspace_settings.is_data or image.colorspace_settings.name in LINEAR_SPACES
+
+
+def _associates(image: bpy.types.Image) -> bool:
+    """Whether Cycles wants the colors of an image multiplied by its alpha."""
+    return not image.colorspace_settings.is_data and image.alpha_mode in {"STRAIGHT", "PREMUL"}
+
+
+def _is_grey_with_alpha(image: bpy.types.Image) -> bool:
+    header = image_header(image)
+    return header is not None and header.is_grey_with_alpha
+
+
+def read_tile(image: bpy.types.Image, number: int, limits: Limits = DEFAULT_LIMITS) -> Pixels | None:
+    """The pixels of one tile of a UDIM set, by its number (1001 ...); None where it is missing or broken.
+
+    Raises:
+        MeshError: as read_pixels.
+    """
+    with _tile_image(image, number) as tile:
+        return None if tile is None else read_pixels(tile, limits)
+
+
+@contextmanager
+def _tile_image(image: bpy.types.Image, number: int) -> Iterator[bpy.types.Image | None]:
+    """A tile as an image of its own, for a while; Blender shows only the first tile's pixels to Python."""
+    packed = next((file.packed_file for file in image.packed_files if file.tile_number == number), None)
+    path = tile_path(image, number)
+    if packed is not None:
+        own = bpy.data.images.new("FMQM tile", 1, 1)
+        own.pack(data=packed.data, data_len=len(packed.data))
+        own.source = "FILE"
+    elif os.path.isfile(path):
+        own = bpy.data.images.load(path, check_existing=False)
+    else:
+        yield None
+        return
+    try:
+        own.colorspace_settings.name = image.colorspace_settings.name
+        own.alpha_mode = image.alpha_mode
+        yield own
+    finally:
+        bpy.data.images.remove(own)
+
+
+def image_path(image: bpy.types.Image) -> str:
+    """The absolute path of an image's file, "" for an image made in Blender."""
+    if image.source == "GENERATED" or not image.filepath:
+        return ""
+    path = bpy.path.abspath(image.filepath, library=image.library)
+    if "\\" in path and not os.path.exists(path):  # written on Windows, as Blender reads it elsewhere
+        path = path.replace("\\", "/")
+    return os.path.normpath(path)
+
+
+def tile_path(image: bpy.types.Image, number: int) -> str:
+    """The absolute path of a tile's file, after Blender's two ways to number them."""
+    column, row = tile_place(number)
+    path = image_path(image)
+    return path.replace("<UDIM>", str(number)).replace("<UVTILE>", f"u{column + 1}_v{row + 1}")
+
+
+def tile_place(number: int) -> tuple[int, int]:
+    """Column and row of a tile: 1001 is (0, 0), 1002 (1, 0), 1011 (0, 1)."""
+    return (number - 1001) % 10, (number - 1001) // 10
+
+
+def why_unread(image: bpy.types.Image) -> str:
+    """Which image could not be read and what is wrong with it, for messages."""
+    path = image_path(image)
+    here = os.path.exists(path) or image.packed_file is not None
+    return f"{path or image.name}: the base-color image " + (
+        "is broken or of a kind that Blender cannot read" if here else "is missing"
+    )
+
+
+def check_limits(image: bpy.types.Image, limits: Limits) -> None:
+    """Refuses an image before anything decodes it.
+
+    Raises:
+        MeshError: its header promises more than the limits.
+    """
+    header = image_header(image)
+    if header is not None:
+        _check(header, image_path(image) or image.name, limits)
+
+
+def _check(header: Header, name: str, limits: Limits) -> None:
+    size = f"{header.width} x {header.height} pixels"
+    if max(header.width, header.height) > limits.side:
+        raise MeshError(f"{name}: the image promises {size}, more than {limits.side} a side; see --max-image-side")
+    if header.decoded > limits.decoded:
+        raise MeshError(
+            f"{name}: the image promises {size}, {header.decoded} bytes once decoded, more than {limits.decoded}; "
+            "see --max-image-bytes"
+        )
+
+
+def image_header(image: bpy.types.Image) -> Header | None:
+    """Size and kind of an image (a UDIM set's first tile) without decoding it; None where that cannot be known."""
+    if image.source == "GENERATED":
+        return Header(image.generated_width, image.generated_height, image.use_generated_float)
+    if image.packed_file is not None:
+        return read_header(io.BytesIO(image.packed_file.data))
+    path = image_path(image)
+    return file_header(tile_path(image, image.tiles[0].number) if image.source == "TILED" else path)
+
+
+def image_facts(image: bpy.types.Image, role: str, digest: str) -> ImageFacts:
+    """What a report says about an image; nothing is decoded."""
+    header = image_header(image)
+    return ImageFacts(
+        role=role,
+        name=image.name,
+        path=image_path(image),
+        width=header.width if header is not None else 0,
+        height=header.height if header is not None else 0,
+        color_space=image.colorspace_settings.name,
+        missing=not digest,
+        digest=digest,
+    )
+
+
+def image_digest(image: bpy.types.Image) -> str:
+    """The same for the same content: of painted or generated images the pixels, else the file's bytes, of UDIM sets
+    all tiles' files; "" where there is nothing."""
+    digest = hashlib.blake2b(digest_size=16)
+    if image.source == "GENERATED" or image.is_dirty:
+        values: NDArray[np.float32] = np.empty(len(image.pixels), np.float32)
+        image.pixels.foreach_get(values)
+        digest.update(values.tobytes())
+        return digest.hexdigest()
+    found = False
+    for block in _blocks(image):
+        digest.update(block)
+        found = True
+    return digest.hexdigest() if found else ""
+
+
+def _blocks(image: bpy.types.Image) -> Iterator[bytes]:
+    """The bytes of an image's files, in pieces."""
+    packed = [file.packed_file.data for file in image.packed_files]
+    if packed:
+        yield from packed
+        return
+    tiled = image.source == "TILED"
+    for path in [tile_path(image, tile.number) for tile in image.tiles] if tiled else [image_path(image)]:
+        if os.path.isfile(path) and os.access(path, os.R_OK):
+            with open(path, "rb") as file:
+                while block := file.read(2**20):
+                    yield block
+
+
+def load_texture(path: str, limits: Limits = DEFAULT_LIMITS) -> Texture:
+    """An image file as a repeating texture; its alpha does not count; nothing stays in bpy.data.
+
+    Raises:
+        FileError: it cannot be read.
+        MeshError: it promises more than the limits.
+    """
+    if not os.path.isfile(path):
+        raise FileError(f"{path}: no such image file")
+    try:
+        image = bpy.data.images.load(path, check_existing=False)
+    except RuntimeError as error:
+        raise FileError(f"{path}: not an image that Blender can read") from error
+    try:
+        image.alpha_mode = "NONE"
+        pixels = read_pixels(image, limits)
+    finally:
+        bpy.data.images.remove(image)
+    if pixels is None:
+        raise FileError(f"{path}: not an image that Blender can read")
+    return Texture(pixels.values, linear=pixels.linear)

@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The way through a node tree: what feeds a socket, past reroutes, muted nodes and groups."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+
+from ..metric.errors import FMQMError
+
+_ROLES = {"Base Color": "base color", "Color": "base color", "Alpha": "alpha", "Fac": "alpha", "Factor": "alpha"}
+
+
+class NotReadError(FMQMError):
+    """A node that is not read; read_look answers it with Unread, so that callers never see it."""
+
+    def __init__(self, node: bpy.types.Node, why: str) -> None:
+        super().__init__(f"{node.name}: {why}")
+        self.node, self.why = node.name, why
+
+
+@dataclass(frozen=True)
+class Place:
+    """A socket, and the group nodes that lead to its tree."""
+
+    socket: bpy.types.NodeSocket
+    groups: tuple[bpy.types.Node, ...] = ()
+
+    @property
+    def node(self) -> bpy.types.Node:
+        return self.socket.node
+
+    def input(self, name: str | int) -> Place:
+        """What feeds an input of this place's node, by its name or number."""
+        return source(Place(self.node.inputs[name], self.groups))
+
+
+def outputs(material: bpy.types.Material) -> list[Place]:
+    """What feeds the active output: its surface and its displacement, where something does."""
+    tree = material.node_tree
+    output = None if tree is None else tree.get_output_node("ALL")
+    if output is None:
+        return []
+    return [Place(output.inputs[name]) for name in ("Surface", "Displacement") if _link(output.inputs[name])]
+
+
+def surface_of(material: bpy.types.Material) -> Place | None:
+    """The output's surface socket, where something feeds it."""
+    return next((place for place in outputs(material) if place.socket.name == "Surface"), None)
+
+
+def _link(socket: bpy.types.NodeSocket) -> bpy.types.NodeLink | None:
+    """The link into an input that counts."""
+    return next((link for link in socket.links if link.is_valid and not link.is_muted), None)
+
+
+def source(place: Place) -> Place:
+    """The output that feeds an input, through reroutes, muted nodes and groups; where none does, the input whose own
+    value counts.
+
+    Raises:
+        NotReadError: the way there cannot be followed.
+    """
+    wanted = family(place.socket)
+    while (link := _link(place.socket)) is not None:
+        output, node = link.from_socket, link.from_node
+        if node.type == "REROUTE":
+            place = Place(node.inputs[0], place.groups)
+        elif node.mute:
+            through = next((inner.from_socket for inner in node.internal_links if inner.to_socket == output), None)
+            if through is None:
+                raise NotReadError(node, "is muted and lets nothing through")
+            place = Place(through, place.groups)
+        elif node.type == "GROUP":
+            place = Place(_group_result(node, output.identifier), (*place.groups, node))
+        elif node.type == "GROUP_INPUT":
+            place = Place(by_identifier(place.groups[-1].inputs, output.identifier, node), place.groups[:-1])
+        else:
+            return Place(output, place.groups)
+        if family(place.socket) != wanted:
+            raise NotReadError(node, "turns a color into a number or a number into a color")
+    return place
+
+
+def family(socket: bpy.types.NodeSocket) -> str:
+    """The kind of what a socket carries: VECTOR for colors too, VALUE for all numbers, SHADER."""
+    return {"RGBA": "VECTOR", "INT": "VALUE", "BOOLEAN": "VALUE"}.get(socket.type, socket.type)
+
+
+def _group_result(node: bpy.types.Node, identifier: str) -> bpy.types.NodeSocket:
+    inner = () if node.node_tree is None else node.node_tree.nodes
+    output = next((each for each in inner if each.type == "GROUP_OUTPUT" and each.is_active_output), None)
+    if output is None:
+        raise NotReadError(node, "is a group without an output")
+    return by_identifier(output.inputs, identifier, node)
+
+
+def by_identifier(sockets: Any, identifier: str, node: bpy.types.Node) -> bpy.types.NodeSocket:
+    """The socket of that identifier among a node's.
+
+    Raises:
+        NotReadError: there is none.
+    """
+    found = next((socket for socket in sockets if socket.identifier == identifier), None)
+    if found is None:
+        raise NotReadError(node, "has lost a socket")
+    return found
+
+
+def upstream(start: Place) -> Iterator[tuple[bpy.types.Node, str]]:
+    """Every node that an input depends on, with its role: the name of the shader's input that it feeds."""
+    for place, role in upstream_outputs(start):
+        yield place.node, role
+
+
+def upstream_outputs(start: Place) -> Iterator[tuple[Place, str]]:
+    """Every output that an input depends on, with its role."""
+    queue, seen = [(start, start.socket.name)], set()
+    while queue:
+        asking, role = queue.pop(0)
+        try:
+            place = source(asking)
+        except NotReadError:
+            continue
+        key = (place.socket.as_pointer(), tuple(group.as_pointer() for group in place.groups), role)
+        if not place.socket.is_output or key in seen:
+            continue
+        seen.add(key)
+        yield place, role
+        for socket in place.node.inputs:
+            own = place.socket.type == "SHADER" and socket.type != "SHADER"
+            queue.append((Place(socket, place.groups), _ROLES.get(socket.name, socket.name) if own else role))

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A trust report as JSON, and what JSON keeps of it as text for people."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..metric.trust import Fact, Trust
+
+Report = dict[str, dict[str, dict[str, Any]]]  # group, fact, "value" and "unit"
+
+GROUPS = ("reference", "distorted", "pair")
+SHARE = "share"  # what the unit of a share in [0, 1] begins with
+_UNKNOWN = "?"
+_SAID_BY_VALUE = {"yes or no", "number"}  # units that a reader of the value needs not be told
+_APART = {"settings", "images"}  # not in the table: said elsewhere, and in lines of their own
+
+
+def trust_dict(trust: Trust) -> Report:
+    """Facts by group and name, each {"value": ..., "unit": ...}; one that is not known is null and says "why"."""
+    return {group: {fact.name: _fact_dict(fact) for fact in getattr(trust, group)} for group in GROUPS}
+
+
+@dataclass(frozen=True)
+class Line:
+    """A fact as people read it.
+
+    Attributes:
+        label: what. values: of the pair, or of reference and distorted. unit: of them.
+    """
+
+    label: str
+    values: tuple[str, ...]
+    unit: str
+
+
+def trust_lines(report: Report) -> list[Line]:
+    """What trust_dict gave, line by line: the meshes' facts, the pair's, the images."""
+    reference, distorted, pair = (report[group] for group in GROUPS)
+    lines = [
+        Line(_label(name), (_text(item), _text(distorted[name])), _unit(item))
+        for name, item in reference.items()
+        if name not in _APART and not _is_long(item)
+    ]
+    lines += [Line(_label(name), (_text(item),), _unit(item)) for name, item in pair.items() if name not in _APART]
+    for group in GROUPS[:2]:
+        lines += [
+            Line(f"{_label(name)}, {group}", (_text(item),), _unit(item))
+            for name, item in report[group].items()
+            if name not in _APART and _is_long(item)
+        ]
+        lines += [Line(f"{image['role']}, {group}", (_image_text(image),), "") for image in _images(report[group])]
+    return lines
+
+
+def trust_text(report: Report) -> str:
+    """An aligned table."""
+    lines = trust_lines(report)
+    labels = max(len(line.label) for line in lines)
+    both = [GROUPS[:2], *(line.values for line in lines if len(line.values) == 2)]
+    widths = [max(len(values[k]) for values in both) for k in range(2)]
+    rows = [f"{'':{labels}}  {'reference':>{widths[0]}}  {'distorted':>{widths[1]}}"]
+    for line in lines:
+        if len(line.values) == 2:
+            cells = "  ".join(value.rjust(width) for value, width in zip(line.values, widths, strict=True))
+        else:
+            cells = line.values[0].rjust(sum(widths) + 2)
+        rows.append(f"{line.label.ljust(labels)}  {cells}  {line.unit}".rstrip())
+    return "\n".join(rows) + "\n"
+
+
+def _fact_dict(fact: Fact) -> dict[str, Any]:
+    known = {"value": fact.value, "unit": fact.unit}
+    return known if fact.value is not None else {**known, "why": fact.why}
+
+
+def _label(name: str) -> str:
+    return name.replace("_", " ").replace("uv ", "UV ")
+
+
+def _unit(item: dict[str, Any]) -> str:
+    unit: str = item["why"] if item["value"] is None else item["unit"]
+    return "" if unit in _SAID_BY_VALUE else unit.removeprefix(SHARE).strip()
+
+
+def _is_long(item: dict[str, Any]) -> bool:
+    """A list or a table: it has a line of its own for each mesh."""
+    return isinstance(item["value"], (list, dict))
+
+
+def _images(group: dict[str, dict[str, Any]]) -> list[dict[str, Any]]:
+    images: list[dict[str, Any]] = group["images"]["value"]
+    return images
+
+
+def _text(item: dict[str, Any]) -> str:
+    value = item["value"]
+    if value is None:
+        return _UNKNOWN
+    return _value_text(value, str(item["unit"]).startswith(SHARE))
+
+
+def _value_text(value: Any, is_share: bool) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{100 * value:.3g} %" if is_share else f"{value:.4g}"
+    if isinstance(value, int):
+        return f"{value:,}"
+    if isinstance(value, dict):
+        return ", ".join(f"{name} {_value_text(part, is_share)}" for name, part in value.items()) or "none"
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return ", ".join(_value_text(part, is_share) for part in value) or "none"
+    return str(value)
+
+
+def _image_text(image: dict[str, Any]) -> str:
+    if image["missing"]:
+        return f"{image['name']}, missing ({image['path'] or 'no path'})"
+    return f"{image['name']}, {image['width']} x {image['height']}, {image['color_space']}"

@@ -1,0 +1,251 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Malformed and odd files: each is scored, 1 against itself, or refused in one line that names it; nothing remains."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from fmqm_addon.blender.files import SUFFIXES, load_placed
+from fmqm_addon.blender.measure import Measurement
+from fmqm_addon.blender.space import place
+from fmqm_addon.metric.errors import FMQMError
+from fmqm_addon.metric.settings import Settings
+
+from . import scenes
+from .hostile_files import TETRAHEDRON, Outcome, all_files
+from .script import noise, score, write_png, write_torus
+
+FILES = all_files()
+TINY = Settings(samples=320, patches=5, color_units=10)
+TINY_FLAGS = ("--quiet", "--samples", "320", "--patches", "5", "--color-units", "10")
+SECONDS = 60  # in which a file must be done with
+
+# The files of the shared folder "hostile".
+REAL: dict[str, Outcome] = {
+    "glb_alpha_modes/AlphaBlendModeTest.glb": 1.0,
+    "glb_draco/heart_draco.glb": (1.0, "the importer broke off"),
+    "glb_inf_coords/BoxWithInfinites.glb": (1.0, "zero area"),
+    "glb_multi_uv/MultiUVTest.glb": 1.0,
+    "glb_vertex_colour_and_texture/chr_knight.glb": 1.0,
+    "gltf_instances/three_cubes_instances.gltf": 1.0,
+    "gltf_missing_bin/BoxTextured.gltf": "Missing resource",
+    "gltf_primitive_modes/Mesh_PrimitiveMode_00.gltf": "no faces",
+    "gltf_primitive_modes/Mesh_PrimitiveMode_01.gltf": "no faces",
+    "gltf_primitive_modes/Mesh_PrimitiveMode_02.gltf": "no faces",
+    "gltf_primitive_modes/Mesh_PrimitiveMode_03.gltf": "no faces",
+    "gltf_primitive_modes/Mesh_PrimitiveMode_04.gltf": 1.0,
+    "gltf_primitive_modes/Mesh_PrimitiveMode_05.gltf": 1.0,
+    "gltf_primitive_modes/Mesh_PrimitiveMode_06.gltf": 1.0,
+    "gltf_primitive_modes/Mesh_PrimitiveMode_07.gltf": "no faces",
+    "gltf_sparse/SimpleSparseAccessor.gltf": 1.0,
+    "gltf_texture_transform/TextureTransformTest.gltf": 1.0,
+    "gltf_wrong_types/badArray.gltf": "parse glTF",
+    "gltf_wrong_types/badString.gltf": "parse glTF",
+    "gltf_wrong_types/badUint.gltf": 1.0,
+    "obj_concave_polygon/concave_polygon.obj": 1.0,
+    "obj_empty_header/empty.obj": "no mesh",
+    "obj_empty_header/empty.ply": "no vertices",
+    "obj_empty_header/ply_empty_header.ply": "no vertices",
+    "obj_index_out_of_range/malformed.obj": 1.0,
+    "obj_index_out_of_range/malformed2.obj": 1.0,
+    "obj_missing_files/model.obj": "base-color image is missing",
+    "obj_missing_files/model2.obj": 1.0,
+    "obj_mtl_file_missing/jacked.obj": 1.0,
+    "obj_nan_coords/test-nan.obj": 1.0,
+    "obj_negative_indices/negative_indices.obj": 1.0,
+    "obj_ngons_multitexture/simple-multitexture-polygon.obj": 1.0,
+    "obj_no_uv/CubeTriangleFaces.obj": 1.0,
+    "obj_nonconvex_quad/non_convex_quad.obj": 1.0,
+    "obj_nonmanifold_edge/nonmanifold_edge.obj": 1.0,
+    "obj_nonmanifold_edge/nonmanifold_vertex.obj": 1.0,
+    "obj_nonmanifold_edge/nonoriented_edge.obj": 1.0,
+    "obj_number_formats/number_formats.obj": "zero area",
+    "obj_partial_vertex_colours/cube_with_vertexcolors.obj": 1.0,
+    "obj_partial_vertex_colours/only_a_part_of_vertexcolors.obj": 1.0,
+    "obj_truncated/spot_cut.obj": 1.0,
+    "obj_windows_paths_spider/spider.obj": 1.0,
+    "ply_moebius/moebius-160-10.ply": 1.0,
+    "ply_two_textures/TextureDouble.ply": 1.0,
+    "ply_two_textures/TextureSingle.ply": 1.0,
+    "space_names_gltf/CubeImageUriMultipleSpaces.gltf": 1.0,
+    "space_names_gltf/CubeImageUriSpaces.gltf": 1.0,
+    "tex_exr_alpha/cube.obj": 1.0,
+    "tex_hdr/cube.obj": 1.0,
+    "tex_jpg_exif_rotated/cube.obj": 1.0,
+    "tex_png16_grey_trns/cube.obj": 1.0,
+    "tex_png1_grey/cube.obj": 1.0,
+    "tex_png_1x1/cube.obj": 1.0,
+    "tex_png_garbage/cube.obj": "the image promises",
+    "tex_png_palette_alpha/cube.obj": 1.0,
+    "tex_png_rgb_trns/cube.obj": 1.0,
+    "tex_png_truncated/cube.obj": "base-color image is broken",
+    "udim/plane_udim.blend": 1.0,
+    "udim/usdUdims.usda": "holds no image",
+}
+
+
+def outcome(path: Path | str) -> float | str:
+    """The score of a file against itself, or the line that refuses it."""
+    try:
+        reference = load_placed(str(path))
+        measurement = Measurement(reference.world(), TINY)
+        measurement.prepare().run()
+        scores = measurement.compare(place(reference, load_placed(str(path))).mesh).run().scores
+    except FMQMError as error:
+        assert len(str(error).splitlines()) == 1
+        assert Path(path).name in str(error)
+        return str(error)
+    assert len(set(scores.tolist())) == 1, scores
+    return float(scores[0])
+
+
+def expected(found: float | str, wanted: Outcome) -> bool:
+    if isinstance(wanted, tuple):
+        return any(expected(found, each) for each in wanted)
+    return wanted in found if isinstance(found, str) and isinstance(wanted, str) else found == wanted
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """All files of hostile_files, and a good pair."""
+    made = tmp_path_factory.mktemp("hostile")
+    for name, (content, _) in FILES.items():
+        (made / name).write_bytes(content)
+    write_png(made / "noise.png", noise())
+    write_torus(made, "good_1", "noise.png")
+    write_torus(made, "good_2", "noise.png", shake=0.03)
+    return made
+
+
+def good_scores(folder: Path) -> list[float]:
+    reference = load_placed(str(folder / "good_1.obj"))
+    measurement = Measurement(reference.world(), TINY)
+    measurement.prepare().run()
+    return measurement.compare(place(reference, load_placed(str(folder / "good_2.obj"))).mesh).run().scores.tolist()
+
+
+@pytest.fixture(scope="module")
+def good(folder: Path) -> list[float]:
+    """What the good pair scores before anything else was opened."""
+    scenes.clear()
+    return good_scores(folder)
+
+
+@pytest.fixture
+def unharmed(folder: Path, good: list[float]) -> Iterator[None]:
+    """Nothing stays in the session, and the good pair scores what it did, to the last bit."""
+    before = scenes.blocks()
+    yield
+    assert scenes.blocks() == before
+    assert good_scores(folder) == good
+
+
+@pytest.mark.parametrize("kind", sorted({Path(name).suffix for name in FILES}))
+def test_each_file_is_scored_or_refused(folder: Path, unharmed: None, kind: str) -> None:
+    """One after the other in one process."""
+    before = scenes.blocks()
+    for name in sorted(FILES):
+        if Path(name).suffix == kind:
+            found = outcome(folder / name)
+            assert expected(found, FILES[name][1]), f"{name}: {found}"
+            assert scenes.blocks() == before, name
+
+
+def test_a_run_goes_on_after_hostile_files(folder: Path) -> None:
+    """The script: a line for each, and the good pair between them as if it were alone."""
+    bad = [folder / name for name in sorted(FILES) if FILES[name][1] == "the importer broke off"]
+    assert len(bad) > 9
+    good = folder / "good_2.obj"
+    done = score(folder / "good_1.obj", good, *bad, good, *TINY_FLAGS)
+    alone = score(folder / "good_1.obj", good, *TINY_FLAGS)
+    assert done.returncode == 1 and alone.returncode == 0
+    rows = [line.split()[1:] for line in done.stdout.splitlines() if line.split()[0].endswith("good_2.obj")]
+    assert rows == [alone.stdout.splitlines()[1].split()[1:]] * 2
+    said = [line for line in done.stderr.splitlines() if line.startswith("score.py: ") and "warning" not in line]
+    assert [name.name in line for name, line in zip(bad, said, strict=True)] == [True] * len(bad)
+
+
+# Paths
+
+
+def test_paths_that_are_no_files(tmp_path: Path, unharmed: None) -> None:
+    (tmp_path / "folder.obj").mkdir()
+    (tmp_path / "ring.obj").symlink_to(tmp_path / "ring.obj")
+    (tmp_path / "nowhere.glb").symlink_to(tmp_path / "gone.glb")
+    os.mkfifo(tmp_path / "pipe.ply")
+    for name, words in (
+        ("folder.obj", "a file is wanted"),
+        ("pipe.ply", "a file is wanted"),
+        ("ring.obj", "no such file"),
+        ("nowhere.glb", "no such file"),
+    ):
+        assert words in str(outcome(tmp_path / name))
+
+
+@pytest.mark.parametrize("name", ["two\nlines", "tab\t%s{0}", "\u202e\U0001f480", "-dash", "x" * 240, "a:b", " "])
+def test_names_of_files(tmp_path: Path, unharmed: None, name: str) -> None:
+    path = tmp_path / f"{name}.obj"
+    path.write_text(TETRAHEDRON)
+    assert outcome(path) == 1.0
+    path.write_text("v 0 0 0\n")
+    with pytest.raises(FMQMError) as caught:
+        load_placed(str(path))
+    assert len(str(caught.value).splitlines()) == 1
+
+
+def test_name_that_is_not_utf_8(tmp_path: Path, unharmed: None) -> None:
+    path = os.fsdecode(os.fsencode(tmp_path) + b"/\xff\xfe.obj")
+    Path(path).write_text(TETRAHEDRON)
+    assert expected(outcome(path), (1.0, "only names in UTF-8"))
+
+
+# Real files
+
+
+def real_files(shared_data: Path) -> list[Path]:
+    return sorted(p for p in (shared_data / "hostile").rglob("*") if p.suffix.lower() in SUFFIXES and p.is_file())
+
+
+def test_every_real_file_is_in_the_table(shared_data: Path) -> None:
+    names = {path.relative_to(shared_data / "hostile").as_posix() for path in real_files(shared_data)}
+    assert names == set(REAL)
+
+
+def test_real_files_in_one_process(shared_data: Path, unharmed: None) -> None:
+    before = scenes.blocks()
+    for name, wanted in REAL.items():
+        found = outcome(shared_data / "hostile" / name)
+        assert expected(found, wanted), f"{name}: {found}"
+        assert scenes.blocks() == before, name
+
+
+def test_real_files_in_a_process_each(shared_data: Path) -> None:
+    """A line of the table or one line on stderr that names the file, and nothing else but warnings."""
+
+    def scored(name: str) -> tuple[str, float | str]:
+        path = shared_data / "hostile" / name
+        done = score(path, path, *TINY_FLAGS, timeout=SECONDS)
+        said = [line for line in done.stderr.splitlines() if line.startswith("score.py: ")]
+        errors = [line for line in said if not line.startswith("score.py: warning: ")]
+        if done.returncode == 0:
+            assert not errors
+            return name, float(re.split(r"\s+", done.stdout.splitlines()[1].strip())[-5])
+        assert done.returncode == 1 and len(errors) == 1 and path.name in errors[0], done.stderr
+        return name, errors[0]
+
+    some = sorted(REAL)[::6]  # a start takes longer than the rest; all of them are opened above
+    with ThreadPoolExecutor(2) as pool:
+        for name, found in pool.map(scored, some):
+            assert expected(found, REAL[name]), f"{name}: {found}"
+
+
+def test_a_copy_elsewhere_is_the_same_file(shared_data: Path, tmp_path: Path, unharmed: None) -> None:
+    shutil.copytree(shared_data / "hostile" / "obj_windows_paths_spider", tmp_path / "a b")
+    assert outcome(tmp_path / "a b" / "spider.obj") == 1.0
