@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from fmqm_addon.blender.process import require_bpy, take_stdout
 from fmqm_addon.blender.space import SPACES
-from fmqm_addon.metric.errors import FMQMError, SettingsError
+from fmqm_addon.metric.errors import FMQMError, SettingsError, one_line
 from fmqm_addon.metric.settings import CENTERS, COLOR_SPACES, POOLINGS, PRESETS, SETTING_NAMES, Settings
 
 if TYPE_CHECKING:
@@ -290,7 +290,7 @@ class Run:
     def _load(self, spec: str, image: str | None) -> Placed:
         from fmqm_addon.blender.files import load_placed
 
-        return load_placed(spec, self._reading(image))
+        return load_placed(spec, self._reading(image), self._progress.tell)
 
     def _reading(self, image: str | None) -> Reading:
         """How an asset is read whose texture, if not None, is the image."""
@@ -345,9 +345,15 @@ class ProgressLine:
             return
         self._percent = percent
         if self._moving:
-            print(f"\r\x1b[K{percent:3d} %  {text}", end="", file=sys.stderr, flush=True)
+            print(f"\r\x1b[K{percent:3d} %  {one_line(text)}", end="", file=sys.stderr, flush=True)
         else:
-            print(f"{percent:3d} %  {text}", file=sys.stderr, flush=True)
+            print(f"{percent:3d} %  {one_line(text)}", file=sys.stderr, flush=True)
+
+    def tell(self, text: str) -> None:
+        """A line of its own, whatever the percentage."""
+        if not self._quiet:
+            self.end()
+            print(f"      {one_line(text)}", file=sys.stderr, flush=True)
 
     def end(self) -> None:
         if self._moving and not self._quiet:

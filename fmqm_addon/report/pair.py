@@ -6,12 +6,14 @@ from __future__ import annotations
 import csv
 import io
 import json
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from ..metric.errors import one_line
 from ..metric.score import COLUMNS
 from ..metric.spatial import Floats
 from .trust import Report, trust_text
@@ -19,6 +21,7 @@ from .trust import Report, trust_text
 SHOWN = ("FMQM", *(name for name in COLUMNS if name != "FMQM"))  # the score first, then its features
 STAGES = ("load", "prepare", "fields", "features", "total")
 REVERSE = "reverse "  # before the names of the other direction's columns
+_LONE = re.compile("[\ud800-\udfff]")
 _INDEX = {name: COLUMNS.index(name) for name in SHOWN}
 
 
@@ -56,7 +59,9 @@ class PairScore:
 
 def json_text(pairs: Sequence[PairScore], settings: dict[str, Any], versions: dict[str, str]) -> str:
     document = {**versions, "settings": settings, "pairs": [_pair_dict(pair) for pair in pairs]}
-    return json.dumps(document, indent=2, allow_nan=False) + "\n"
+    text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    # Bytes of names that are not UTF-8 are half a character in Python, which strict JSON has not.
+    return _LONE.sub(lambda found: rf"\\u{ord(found[0]):x}", text)
 
 
 def csv_text(pairs: Sequence[PairScore]) -> str:
@@ -82,7 +87,7 @@ def table_text(pairs: Sequence[PairScore]) -> str:
     rows = [["distorted", *SHOWN, *([f"{REVERSE}FMQM"] if both else [])]]
     for pair in pairs:
         if pair.scores is None:
-            rows.append([pair.distorted, *["-"] * (len(rows[0]) - 1)])
+            rows.append([one_line(pair.distorted), *["-"] * (len(rows[0]) - 1)])
             continue
         cells = []
         for name in SHOWN:
@@ -90,7 +95,7 @@ def table_text(pairs: Sequence[PairScore]) -> str:
             cells.append(cell if pair.stderr is None else f"{cell} ±{pair.stderr[_INDEX[name]]:.4f}")
         if both:
             cells.append("-" if pair.reverse is None else f"{pair.reverse[_INDEX['FMQM']]:.4f}")
-        rows.append([pair.distorted, *cells])
+        rows.append([one_line(pair.distorted), *cells])
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     lines = []
     for row in rows:
@@ -102,7 +107,9 @@ def table_text(pairs: Sequence[PairScore]) -> str:
 def trust_tables(pairs: Sequence[PairScore]) -> str:
     """The trust report of each pair that has one, under its name."""
     return "".join(
-        f"\n{pair.distorted} against {pair.reference}\n{trust_text(pair.trust)}" for pair in pairs if pair.trust
+        f"\n{one_line(f'{pair.distorted} against {pair.reference}')}\n{trust_text(pair.trust)}"
+        for pair in pairs
+        if pair.trust
     )
 
 
