@@ -32,7 +32,7 @@ from fmqm_addon.batch.sources import glob_files, lod_rows, plain_rows, read_mani
 from fmqm_addon.batch.workers import Limits, adopt, score_with_workers, workers_command
 from fmqm_addon.blender.process import blender_version, require_bpy, stop_on_signals, take_stdout
 from fmqm_addon.blender.space import SPACES
-from fmqm_addon.metric.errors import FMQMError, SettingsError
+from fmqm_addon.metric.errors import FMQMError, SettingsError, one_line
 from fmqm_addon.metric.settings import CENTERS, COLOR_SPACES, POOLINGS, PRESETS, SETTING_NAMES, Settings
 from fmqm_addon.report.files import check_writable, write_parts
 from fmqm_addon.report.junit import below, junit_parts
@@ -419,7 +419,7 @@ def _say_warnings(records: Iterable[Mapping[str, Any]]) -> None:
         for warning in record["warnings"]:
             if hash(warning) not in said:
                 said.add(hash(warning))
-                print(f"{PROGRAM}: warning: {warning}", file=sys.stderr)
+                print(f"{PROGRAM}: warning: {one_line(warning)}", file=sys.stderr)
 
 
 def _exit_code(records: Iterable[Mapping[str, Any]]) -> int:

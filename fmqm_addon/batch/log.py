@@ -8,6 +8,8 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
+from ..metric.errors import one_line
+
 
 class Log:
     """Progress as a moving line on a terminal, as a line per 10 % otherwise; errors above it.
@@ -35,7 +37,7 @@ class Log:
         if self._quiet or percent // step <= self._percent // step:
             return
         self._percent = percent
-        line = f"{percent:3d} %  {text}{self._rate()}"
+        line = f"{percent:3d} %  {one_line(text)}{self._rate()}"
         if self._moving:
             print(f"\r\x1b[K{line}", end="", file=sys.stderr, flush=True)
         else:
@@ -51,7 +53,7 @@ class Log:
     def say(self, text: str) -> None:
         if not self._silent:
             self.end()
-            print(f"{self._program}: {text}", file=sys.stderr, flush=True)
+            print(f"{self._program}: {one_line(text)}", file=sys.stderr, flush=True)
 
     def note(self, text: str) -> None:
         """What is good to know, but no error."""

@@ -183,7 +183,7 @@ class _Scorer:
             with stops_wait():
                 if image:
                     reading = replace(reading, texture=load_texture(row.path(image), reading.limits))
-                return load_placed(row.path(name), reading)
+                return load_placed(row.path(name), reading, self._log.note)
         finally:
             self._spent("load", time.perf_counter() - began)
 

@@ -14,9 +14,10 @@ import bpy
 from ..metric.errors import FileError, FMQMError, MeshError
 from ..metric.surface import MeshArrays
 from .assets import check_object, scene_members
+from .images import TextureCache
 from .lods import find_chains
 from .material import Reading
-from .mesh import AS_FOUND
+from .mesh import AS_FOUND, to_bake
 from .snapshot import placed
 from .space import Placed
 from .spec import SUFFIXES, split_spec
@@ -28,13 +29,14 @@ def load_mesh(spec: str, reading: Reading = AS_FOUND) -> MeshArrays:
     return load_placed(spec, reading).world()
 
 
-def load_placed(spec: str, reading: Reading = AS_FOUND) -> Placed:
+def load_placed(spec: str, reading: Reading = AS_FOUND, announce: Callable[[str], None] = lambda _: None) -> Placed:
     """The asset in a file as one mesh, with its place; nothing stays in the session.
 
     Args:
         spec: a path, or "file.glb:Object name" for one object, hidden or not. Of a whole file the
             render-visible objects of the active scene count.
         reading: how the materials are read.
+        announce: gets a line before what takes a while.
 
     Raises:
         FileError: the file is missing, unreadable or of an unknown kind, or has no such object.
@@ -47,7 +49,11 @@ def load_placed(spec: str, reading: Reading = AS_FOUND) -> Placed:
         try:
             if not objects:
                 raise MeshError("no mesh in it; a surface is wanted")
-            return placed(objects, object_name or Path(path).name, reading)
+            name, cache = object_name or Path(path).name, TextureCache()
+            baked = to_bake(objects, reading, cache)
+            if baked:
+                announce(f"baking {', '.join(baked)} (materials of {name})")
+            return placed(objects, name, reading, cache=cache)
         except FMQMError as error:
             raise type(error)(f"{spec}: {error}") from error
     finally:

@@ -17,7 +17,7 @@ from .images import TextureCache
 from .material import Reading
 from .measure import Comparison, Measurement
 from .mesh import AS_FOUND
-from .snapshot import Target, fingerprint, take, to_bake
+from .snapshot import Target, bakes, fingerprint, take
 from .space import Placed, Placement, place, place_counts
 from .trust import known_facts
 
@@ -183,7 +183,7 @@ def _read(target: Target, reading: Reading, done: float) -> Work[_Read]:
     yield Progress(f"Reading {target.label}", done)
     began = time.perf_counter()
     cache = TextureCache()
-    baked = to_bake(target, reading, cache)
+    baked = bakes(target, reading, cache)
     if baked:
         yield Progress(f"Reading {target.label}: baking {', '.join(baked)}", done)
     placed, error = None, None

@@ -95,6 +95,28 @@ def _left_out(objects: Sequence[Evaluated]) -> list[tuple[str, str]]:
     ]
 
 
+def to_bake(objects: Sequence[bpy.types.Object], reading: Reading, cache: TextureCache) -> tuple[str, ...]:
+    """Names of the materials that mesh_arrays will bake, which takes a while; what is read now stays in the cache."""
+    if not reading.bake:
+        return ()
+    with evaluated(objects) as found:
+        materials = {
+            slot.material.name: slot.material
+            for each in shown(found)
+            if not each.particle
+            for slot in each.object.material_slots
+            if slot.material is not None
+        }
+        return tuple(name for name in sorted(materials) if _is_unread(materials[name], reading, cache))
+
+
+def _is_unread(material: bpy.types.Material, reading: Reading, cache: TextureCache) -> bool:
+    try:
+        return isinstance(read_look(material, cache, reading), Unread)
+    except MeshError:  # mesh_arrays says so, if a face has it
+        return False
+
+
 @dataclass(frozen=True)
 class _Place:
     """Where a shape is shown: by which of the objects, under which name, (4, 4) to the wanted frame."""

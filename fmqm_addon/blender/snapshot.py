@@ -17,8 +17,8 @@ from ..metric.spatial import Floats
 from .assets import SURFACE_TYPES, check_object, collection_members, family_members, instanced, is_measured
 from .evaluate import evaluated
 from .images import TextureCache
-from .material import Reading, Unread, read_look
-from .mesh import AS_FOUND, mesh_arrays
+from .material import Reading
+from .mesh import AS_FOUND, mesh_arrays, to_bake
 from .space import Placed
 
 OBJECT, COLLECTION = "OBJECT", "COLLECTION"
@@ -57,7 +57,7 @@ def take(target: Target, reading: Reading = AS_FOUND, cache: TextureCache | None
     what it holds; what is hidden from rendering is left out of either, unless all is.
 
     Args:
-        reading: how the materials are read. cache: of to_bake, just before.
+        reading: how the materials are read. cache: of bakes, just before.
 
     Raises:
         MeshError: it is gone, of another type, or holds nothing that can be measured.
@@ -77,25 +77,9 @@ def take(target: Target, reading: Reading = AS_FOUND, cache: TextureCache | None
     return placed([block], target.label, reading, block, cache)
 
 
-def to_bake(target: Target, reading: Reading, cache: TextureCache) -> tuple[str, ...]:
-    """Names of the materials that take will bake, which takes a while; what is read meanwhile is in the cache."""
-    if not reading.bake:
-        return ()
-    members = _members(target)
-    materials = {
-        slot.material.name: slot.material
-        for object_ in (*members, *_instances_of(members))
-        for slot in object_.material_slots
-        if slot.material is not None
-    }
-    return tuple(name for name in sorted(materials) if _is_unread(materials[name], reading, cache))
-
-
-def _is_unread(material: bpy.types.Material, reading: Reading, cache: TextureCache) -> bool:
-    try:
-        return isinstance(read_look(material, cache, reading), Unread)
-    except MeshError:  # take says so, if a face has it
-        return False
+def bakes(target: Target, reading: Reading, cache: TextureCache) -> tuple[str, ...]:
+    """Names of the materials that take will bake; as mesh.to_bake."""
+    return to_bake(_members(target), reading, cache)
 
 
 def placed(
@@ -279,8 +263,19 @@ def _add_values(digest: Any, block: Any) -> None:
             digest.update(f"{name}={getattr(block, name).name_full}".encode())
     if isinstance(block, bpy.types.Modifier):
         digest.update(f"{block.show_viewport}".encode())
-        if block.type == "NODES":
-            digest.update(repr([(key, str(block[key])) for key in block.keys()]).encode())  # noqa: SIM118
+        if block.type == "NODES" and block.node_group is not None:
+            _add_node_inputs(digest, block)
+
+
+def _add_node_inputs(digest: Any, modifier: bpy.types.Modifier) -> None:
+    if not hasattr(modifier, "properties"):  # before Blender 5.2
+        digest.update(repr([(key, _plain(modifier[key])) for key in modifier.keys()]).encode())  # noqa: SIM118
+        return
+    inputs = modifier.properties.inputs
+    for prop in inputs.bl_rna.properties:
+        if prop.type == "POINTER" and prop.identifier != "rna_type":
+            digest.update(prop.identifier.encode())
+            _add_values(digest, getattr(inputs, prop.identifier))
 
 
 def _plain(value: Any) -> Any:

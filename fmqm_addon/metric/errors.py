@@ -2,6 +2,11 @@
 """The one family of exceptions that callers are meant to catch."""
 
 
+def one_line(text: str) -> str:
+    """The text as it can be shown: breaks, control characters and what is not Unicode are escaped as in Python."""
+    return "".join(each if each.isprintable() else each.encode("unicode_escape").decode() for each in text)
+
+
 class FMQMError(Exception):
     """Something given cannot be measured; the text names it and says what is wanted.
 
@@ -9,7 +14,7 @@ class FMQMError(Exception):
     """
 
     def __str__(self) -> str:
-        return " ".join(super().__str__().splitlines())
+        return one_line(super().__str__())
 
 
 class SettingsError(FMQMError):

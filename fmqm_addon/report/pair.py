@@ -6,6 +6,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import re
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -14,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from ..metric.errors import one_line
 from ..metric.score import COLUMNS
 from ..metric.spatial import Floats
 from .trust import Report, trust_text
@@ -21,6 +23,7 @@ from .trust import Report, trust_text
 SHOWN = ("FMQM", *(name for name in COLUMNS if name != "FMQM"))  # the score first, then its features
 STAGES = ("load", "prepare", "fields", "features", "total")
 REVERSE = "reverse "  # before the names of the other direction's columns
+_LONE = re.compile("[\ud800-\udfff]")
 _INDEX = {name: COLUMNS.index(name) for name in SHOWN}
 
 
@@ -70,13 +73,19 @@ def json_parts(
     records: Iterable[Mapping[str, Any]], settings: Mapping[str, Any], versions: Mapping[str, str]
 ) -> Iterator[str]:
     """The text of a document, record after record: however many there are, one is in memory."""
-    head = json.dumps({**versions, "settings": settings, "pairs": []}, indent=2, allow_nan=False)
+    head = _json({**versions, "settings": settings, "pairs": []})
     yield head.removesuffix("]\n}")
     separator = "\n"
     for record in records:
-        yield separator + textwrap.indent(json.dumps(record, indent=2, allow_nan=False), "    ")
+        yield separator + textwrap.indent(_json(record), "    ")
         separator = ",\n"
     yield "]\n}\n" if separator == "\n" else "\n  ]\n}\n"
+
+
+def _json(value: Any) -> str:
+    text = json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False)
+    # Bytes of names that are not UTF-8 are half a character in Python, which strict JSON has not.
+    return _LONE.sub(lambda found: rf"\\u{ord(found[0]):x}", text)
 
 
 def csv_parts(records: Iterable[Mapping[str, Any]]) -> Iterator[str]:
@@ -112,7 +121,8 @@ def trust_parts(records: Iterable[Mapping[str, Any]]) -> Iterator[str]:
     """The trust report of each record that has one, under its name."""
     for record in records:
         if record["trust"]:
-            yield f"\n{record['id']} against {record['reference']}\n{trust_text(record['trust'])}"
+            names = one_line(f"{record['id']} against {record['reference']}")
+            yield f"\n{names}\n{trust_text(record['trust'])}"
 
 
 def pair_record(pair: PairScore) -> dict[str, Any]:
@@ -143,10 +153,10 @@ def _cells(record: Mapping[str, Any], both: bool) -> tuple[str, ...]:
     reverse = record["reverse"]
     turned = [f"{reverse['FMQM']:.4f}" if reverse else "-"] if both else []
     if record["FMQM"] is None:
-        return (record["id"], *["-"] * len(SHOWN), *turned)
+        return (one_line(record["id"]), *["-"] * len(SHOWN), *turned)
     stderr = record["stderr"]
     spread = {name: f" ±{stderr[name]:.4f}" if stderr else "" for name in SHOWN}
-    return (record["id"], *(f"{record[name]:.4f}{spread[name]}" for name in SHOWN), *turned)
+    return (one_line(record["id"]), *(f"{record[name]:.4f}{spread[name]}" for name in SHOWN), *turned)
 
 
 def _csv_line(values: Iterable[str]) -> str:

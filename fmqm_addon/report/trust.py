@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ..metric.errors import one_line
 from ..metric.trust import Fact, Trust
 
 Report = dict[str, dict[str, dict[str, Any]]]  # group, fact, "value" and "unit"
@@ -67,7 +68,7 @@ def trust_text(report: Report) -> str:
             cells = "  ".join(value.rjust(width) for value, width in zip(line.values, widths, strict=True))
         else:
             cells = line.values[0].rjust(sum(widths) + 2)
-        rows.append(f"{line.label.ljust(labels)}  {cells}  {line.unit}".rstrip())
+        rows.append(one_line(f"{line.label.ljust(labels)}  {cells}  {line.unit}".rstrip()))
     return "\n".join(rows) + "\n"
 
 

@@ -151,6 +151,30 @@ def test_edits_are_noticed(make: Callable[[], bpy.types.Object]) -> None:
     assert fingerprint(target_of(object_), False) != before
 
 
+def test_inputs_of_geometry_nodes_are_noticed() -> None:
+    """Where Blender keeps them differs between its versions."""
+    tree = bpy.data.node_groups.new("Inputs", "GeometryNodeTree")
+    for direction in ("INPUT", "OUTPUT"):
+        tree.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
+    size, other = (
+        tree.interface.new_socket(name, in_out="INPUT", socket_type=f"NodeSocket{name}").identifier
+        for name in ("Float", "Object")
+    )
+    object_ = scenes.cube()
+    nodes = object_.modifiers.new("Nodes", "NODES")
+    marks = [fingerprint(target_of(object_), False)]
+    nodes.node_group = tree
+    marks.append(fingerprint(target_of(object_), False))
+    assert fingerprint(target_of(object_), False) == marks[-1]
+    for identifier, value in ((size, 2.5), (other, scenes.square())):
+        if hasattr(nodes, "properties"):
+            getattr(nodes.properties.inputs, identifier).value = value
+        else:
+            nodes[identifier] = value
+        marks.append(fingerprint(target_of(object_), False))
+    assert len(set(marks)) == 4
+
+
 @pytest.mark.parametrize("make", KINDS, ids=lambda make: make.__name__)
 def test_kinds_score_1_against_themselves(make: Callable[[], bpy.types.Object]) -> None:
     object_ = make()
@@ -652,8 +676,12 @@ def test_the_panel_says_that_it_bakes() -> None:
     scenes.cube("Pebble", collection=shape, materials=[stone.material_slots[0].material])
     instances = instancer("Instances", shape)
     plain = scenes.cube("Plain", materials=[scenes.material("Green", (0, 1, 0))])
+    nodes = scenes.cube("Nodes")
+    nodes.modifiers.new("Nodes", "NODES").node_group = tree = on_points(scenes.square("Leaf"))
+    next(node for node in tree.nodes if node.type == "SET_MATERIAL").inputs["Material"].default_value = procedural()
     few = Settings(samples=400, patches=4)
-    stepper = measuring(target_of(stone), [target_of(instances), target_of(plain)], few, reading=Reading(bake=32))
+    compared = [target_of(instances), target_of(plain), target_of(nodes)]
+    stepper = measuring(target_of(stone), compared, few, reading=Reading(bake=32))
     stages = []
     while stepper.step():
         stages.append(stepper.progress.stage)
@@ -662,5 +690,6 @@ def test_the_panel_says_that_it_bakes() -> None:
         "Reading Stone", "Reading Stone: baking Veins",
         "Reading Instances", "Reading Instances: baking Veins",
         "Reading Plain",
+        "Reading Nodes", "Reading Nodes: baking Veins.001",
     ]  # fmt: skip
     assert all(outcome.error is None for outcome in stepper.result)

@@ -230,6 +230,22 @@ def test_progress_is_a_line_per_10_percent(whole: Path) -> None:
     assert len({percent // 10 for percent in percents}) == len(percents)
 
 
+def test_baking_is_announced_before_it_begins(tmp_path: Path) -> None:
+    rust = scenes.material("Rust")
+    veins = rust.node_tree.nodes.new("ShaderNodeTexNoise")
+    rust.node_tree.links.new(veins.outputs[1], scenes.base_color(rust))
+    scenes.cube(materials=[scenes.material("Red", (1, 0, 0)), rust]).data.polygons[0].material_index = 1
+    scenes.export(tmp_path, "blend", "crate")
+    done = score("crate.blend", "crate.blend", *SMALL, "--bake", "32", cwd=tmp_path)
+    assert done.returncode == 0
+    lines = done.stderr.splitlines()
+    assert lines[0] == "  0 %  loading crate.blend"
+    assert lines[1].strip() == "baking Rust (materials of crate.blend)"
+    assert sum("baking" in line for line in lines) == 2  # for the reference, and for the other
+    for off in (("--bake", "32", "--quiet"), ("--bake", "0")):
+        assert "baking Rust" not in score("crate.blend", "crate.blend", *SMALL, *off, cwd=tmp_path).stderr
+
+
 def test_same_command_twice_and_json_alone_on_stdout(assets: Path, whole: Path, tmp_path: Path) -> None:
     """The importer of OBJ prints to stdout from C; here nothing but the JSON may arrive, and with --quiet
     nothing at all on stderr. Identical bytes but for the seconds, whatever the locale."""
