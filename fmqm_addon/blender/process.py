@@ -9,8 +9,8 @@ import importlib.metadata
 import os
 import signal
 import sys
-import threading
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import TextIO
 
 from ..metric.errors import FMQMError
@@ -63,21 +63,29 @@ def stops_wait() -> Iterator[None]:
     Raises:
         KeyboardInterrupt: at the end, if there was one.
     """
-    _opening.set()
+    _stops.wait = True
     try:
         yield
     finally:
-        _opening.clear()
-    if _stopped.is_set():
+        _stops.wait = False
+    if _stops.came:
         raise KeyboardInterrupt
 
 
-_opening, _stopped = threading.Event(), threading.Event()
+@dataclass
+class _Stops:
+    """Handlers of signals run between two lines of the same thread: plain values do."""
+
+    wait: bool = False
+    came: bool = False
+
+
+_stops = _Stops()
 
 
 def _stop(number: int, frame: object) -> None:
-    waits = _opening.is_set() and not _stopped.is_set()
-    _stopped.set()
+    waits = _stops.wait and not _stops.came
+    _stops.came = True
     if not waits:
         raise KeyboardInterrupt
 

@@ -240,7 +240,7 @@ def test_baking_is_announced_before_it_begins(tmp_path: Path) -> None:
     assert done.returncode == 0
     lines = done.stderr.splitlines()
     assert lines[0] == "  0 %  loading crate.blend"
-    assert lines[1].strip() == "baking Rust (materials of crate.blend)"
+    assert lines[1] == "score.py: baking Rust (materials of crate.blend)"
     assert sum("baking" in line for line in lines) == 2  # for the reference, and for the other
     for off in (("--bake", "32", "--quiet"), ("--bake", "0")):
         assert "baking Rust" not in score("crate.blend", "crate.blend", *SMALL, *off, cwd=tmp_path).stderr
