@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -20,7 +21,7 @@ from fmqm_addon.metric.settings import Settings
 
 from . import scenes
 from .hostile_files import TETRAHEDRON, Outcome, all_files
-from .script import noise, score, write_png, write_torus
+from .script import noise, read_json, score, write_png, write_torus
 
 FILES = all_files()
 TINY = Settings(samples=320, patches=5, color_units=10)
@@ -220,6 +221,21 @@ def test_name_that_is_not_utf_8(tmp_path: Path, unharmed: None) -> None:
     path = os.fsdecode(os.fsencode(tmp_path) + b"/\xff\xfe.obj")
     Path(path).write_text(TETRAHEDRON)
     assert expected(outcome(path), (1.0, "only names in UTF-8"))
+
+
+def test_names_in_what_the_script_writes(tmp_path: Path) -> None:
+    """A line each in the table and on stderr; JSON holds them as they are, but for bytes that are not UTF-8."""
+    names = ["two\nlines", "\x1b[31mred", os.fsdecode(b"\xff")]
+    for name in names:
+        (tmp_path / f"{name}.obj").write_text("mtllib gone.mtl\n" + TETRAHEDRON)
+    paths = [tmp_path / f"{name}.obj" for name in names]
+    done = score(paths[0], *paths, *TINY_FLAGS, "--json", tmp_path / "out.json")
+    assert len(done.stdout.splitlines()) == 1 + len(paths)
+    assert all(line.startswith("score.py: ") for line in done.stderr.splitlines())
+    assert (done.stdout + done.stderr).replace("\n", "").isprintable()
+    document = read_json(tmp_path / "out.json")
+    json.dumps(document, ensure_ascii=False).encode()  # refuses half characters, as other programs do
+    assert [pair["distorted"] for pair in document["pairs"]] == [*map(str, paths[:2]), f"{tmp_path}/\\udcff.obj"]
 
 
 # Real files
