@@ -74,14 +74,25 @@ def bake_slots(
         owner: what messages call the object.
 
     Raises:
-        MeshError: this Blender has no Cycles, or it fails, or there are too many faces.
+        MeshError: this Blender has no Cycles, or it fails, or there are too many faces, or unsaved painting would be
+            lost.
     """
     try:
+        _check_unsaved()
         with ExitStack() as temporary:
             return _bake(object_, depsgraph, slots, size, temporary)
     except (MeshError, RuntimeError, TypeError) as error:
         why = (str(error).strip() or type(error).__name__).splitlines()[-1].removeprefix("Error: ")
         raise MeshError(f"baking {owner} failed: {why}") from error
+
+
+def _check_unsaved() -> None:
+    """Before Blender 5.2 its baker has every image read from its file again, and neither sees nor keeps painting."""
+    if bpy.app.version >= (5, 2):
+        return
+    for image in bpy.data.images:
+        if image.is_dirty and image.source not in {"GENERATED", "VIEWER"} and not len(image.packed_files):
+            raise MeshError(f"image {image.name} has unsaved changes, which baking would lose; save or pack it first")
 
 
 def _bake(

@@ -8,6 +8,8 @@ from enum import Enum
 
 import bpy
 
+from .nodes import only_shines
+
 # Mixing never hides one of its shaders wholly: what a transparent one covers still has a color.
 _LEAST_SHARE = 1e-4
 _KEPT = {"MIX_SHADER", "ADD_SHADER", "GROUP", "GROUP_INPUT", "REROUTE"}
@@ -101,6 +103,8 @@ def _pass_color(tree: bpy.types.NodeTree, node: bpy.types.Node) -> None:
 
 
 def _color_of(shader: bpy.types.Node) -> bpy.types.NodeSocket | None:
+    if only_shines(shader):
+        return shader.inputs["Emission Color"]
     return shader.inputs.get("Base Color") or shader.inputs.get("Color")
 
 
@@ -121,6 +125,8 @@ def _replace(tree: bpy.types.NodeTree, node: bpy.types.Node, output: bpy.types.N
         wanted = _color_of(node)
         if node.type not in _TRANSPARENT and wanted is not None:
             _take_over(tree, wanted, color)
+        if only_shines(node):
+            _take_over(tree, node.inputs["Emission Strength"], color.node.inputs["Strength"])
         if "Alpha" in node.inputs and node.inputs["Alpha"].is_linked:
             _keep_in_use(tree, node.inputs["Alpha"].links[0].from_socket, color.node.inputs["Strength"])
     elif node.type not in _TRANSPARENT:
@@ -136,7 +142,8 @@ def _keep_in_use(tree: bpy.types.NodeTree, alpha: bpy.types.NodeSocket, strength
     """Cycles divides an image's color by its alpha only where the alpha is used too."""
     one = tree.nodes.new("ShaderNodeMath")
     one.operation = "MULTIPLY_ADD"
-    one.inputs[1].default_value, one.inputs[2].default_value = 1e-7, 1
+    one.inputs[1].default_value = 1e-7
+    _take_over(tree, strength, one.inputs[2])
     tree.links.new(alpha, one.inputs[0])
     tree.links.new(one.outputs[0], strength)
 

@@ -6,22 +6,24 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from contextlib import redirect_stderr
+from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 
 import bpy
 
-from ..metric.errors import FileError, FMQMError, MeshError
+from ..metric.errors import FileError, FMQMError, MeshError, one_line
 from ..metric.surface import MeshArrays
 from .assets import check_object, scene_members
 from .images import TextureCache
 from .lods import find_chains
 from .material import Reading
 from .mesh import AS_FOUND, to_bake
+from .remarks import left_out
 from .snapshot import placed
 from .space import Placed
 from .spec import SUFFIXES, split_spec
-from .truncated import check_alembic, check_ply
+from .truncated import check_alembic, check_ply, check_usd
 
 
 def load_mesh(spec: str, reading: Reading = AS_FOUND) -> MeshArrays:
@@ -49,11 +51,14 @@ def load_placed(spec: str, reading: Reading = AS_FOUND, announce: Callable[[str]
         try:
             if not objects:
                 raise MeshError("no mesh in it; a surface is wanted")
+            remarks = left_out(path, reading.texture is None)
             name, cache = object_name or Path(path).name, TextureCache()
             baked = to_bake(objects, reading, cache)
             if baked:
                 announce(f"baking {', '.join(baked)} (materials of {name})")
-            return placed(objects, name, reading, cache=cache)
+            found = placed(objects, name, reading, cache=cache)
+            warnings = tuple(one_line(f"{Path(path).name}: {remark}") for remark in remarks)
+            return replace(found, mesh=replace(found.mesh, warnings=(*warnings, *found.mesh.warnings)))
         except FMQMError as error:
             raise type(error)(f"{spec}: {error}") from error
     finally:
@@ -138,7 +143,7 @@ _IMPORTERS: dict[str, Callable[[], bpy.types.Operator]] = {
 }
 # These importers do not mend meshes unless told to, and Blender would read beyond the ends of their arrays.
 _OPTIONS = dict.fromkeys((".usd", ".usda", ".usdc", ".usdz", ".abc"), {"validate_meshes": True})
-_CHECKS = {".abc": check_alembic, ".ply": check_ply}
+_CHECKS = {".abc": check_alembic, ".ply": check_ply, ".usd": check_usd, ".usda": check_usd}
 
 
 def _named(name: str, path: str) -> bpy.types.Object:

@@ -48,7 +48,18 @@ from ..metric.color import (
 from ..metric.errors import MeshError
 from .headers import DEFAULT_LIMITS, Limits
 from .images import BRIGHTEST, LINEAR_SPACES, Pixels, TextureCache, check_limits, tile_path, tile_place, why_unread
-from .nodes import NotReadError, Place, by_identifier, family, outputs, source, surface_of, upstream, upstream_outputs
+from .nodes import (
+    NotReadError,
+    Place,
+    by_identifier,
+    family,
+    only_shines,
+    outputs,
+    source,
+    surface_of,
+    upstream,
+    upstream_outputs,
+)
 
 DEFAULT_GREY = 0.8  # linear base color that Blender gives a surface without a material
 MOST_NODES = 200  # of what feeds a base color; read trees are evaluated recursively
@@ -175,7 +186,8 @@ def plain_look(material: bpy.types.Material, warning: str) -> Look:
     surface = surface_of(material)
     if surface is not None:
         shader = next((node for node, _ in upstream(surface) if node.type == "BSDF_PRINCIPLED"), None)
-        color = color if shader is None else shader.inputs["Base Color"].default_value
+        if shader is not None:
+            color = shader.inputs["Emission Color" if only_shines(shader) else "Base Color"].default_value
     return Look(Material(material.name, _plain(color[:3]), how="plain"), (), (warning,))
 
 
@@ -259,17 +271,23 @@ class _Reader:
         if not place.socket.is_output:
             raise NotReadError(place.node, "lacks a shader")
         if kind == "BSDF_PRINCIPLED":
-            return self._light(place.input("Base Color")), self._opacity(place.input("Alpha"))
+            shines = only_shines(place.node)
+            light = self._emission(place, "Emission ") if shines else self._light(place.input("Base Color"))
+            return light, self._opacity(place.input("Alpha"))
         if kind == "BSDF_DIFFUSE":
             return self._light(place.input("Color")), Constant(1.0)
         if kind == "EMISSION":
-            strength = self._number(place.input("Strength"), place.node, "Strength")
-            return _scaled(self._light(place.input("Color")), (strength,) * 3, (0.0,) * 3), Constant(1.0)
+            return self._emission(place), Constant(1.0)
         if kind == "BSDF_TRANSPARENT":
             return _Transparent(), Constant(0.0)
         if kind == "MIX_SHADER":
             return self._mixed_shader(place)
         raise NotReadError(place.node, "is a shader that is not read")
+
+    def _emission(self, place: Place, prefix: str = "") -> Light:
+        """What a shader emits, by its inputs Color and Strength, whose names begin with the prefix."""
+        strength = self._number(place.input(f"{prefix}Strength"), place.node, "Strength")
+        return _scaled(self._light(place.input(f"{prefix}Color")), (strength,) * 3, (0.0,) * 3)
 
     def _mixed_shader(self, place: Place) -> tuple[Light | _Transparent, Value]:
         factor = self._value(place.input(0))

@@ -110,6 +110,16 @@ def by_identifier(sockets: Any, identifier: str, node: bpy.types.Node) -> bpy.ty
     return found
 
 
+def only_shines(node: bpy.types.Node) -> bool:
+    """Whether all that is seen of a Principled BSDF is its emission: the base color is plain black, as in glTF files
+    of what has no light on it."""
+    if node.type != "BSDF_PRINCIPLED" or node.inputs["Base Color"].is_linked:
+        return False
+    base, color, strength = (node.inputs[name] for name in ("Base Color", "Emission Color", "Emission Strength"))
+    lit = strength.is_linked or strength.default_value > 0
+    return lit and max(base.default_value[:3]) <= 0 and (color.is_linked or max(color.default_value[:3]) > 0)
+
+
 def upstream(start: Place) -> Iterator[tuple[bpy.types.Node, str]]:
     """Every node that an input depends on, with its role: the name of the shader's input that it feeds."""
     for place, role in upstream_outputs(start):
@@ -132,4 +142,11 @@ def upstream_outputs(start: Place) -> Iterator[tuple[Place, str]]:
         yield place, role
         for socket in place.node.inputs:
             own = place.socket.type == "SHADER" and socket.type != "SHADER"
-            queue.append((Place(socket, place.groups), _ROLES.get(socket.name, socket.name) if own else role))
+            queue.append((Place(socket, place.groups), _role(socket) if own else role))
+
+
+def _role(socket: bpy.types.NodeSocket) -> str:
+    """Of what feeds a shader's input."""
+    if socket.name == "Emission Color" and only_shines(socket.node):
+        return "base color"
+    return _ROLES.get(socket.name, socket.name)

@@ -12,6 +12,8 @@ import numpy as np
 from ..metric.errors import FileError
 
 _COUNT = re.compile(rb"-?0*\d{1,9}")  # Blender would end the process at 2^31
+_USD_COUNTS = re.compile(rb"faceVertexCounts\s*=\s*\[([-\d,\s]*)\]")
+_USD_INDICES = re.compile(rb"faceVertexIndices\s*=\s*\[([-\d,\s]*)\]")
 _PLY_BYTES = {
     **dict.fromkeys(("char", "uchar", "int8", "uint8"), 1),
     **dict.fromkeys(("short", "ushort", "int16", "uint16"), 2),
@@ -40,6 +42,27 @@ def check_alembic(path: str) -> None:
         children = int.from_bytes(file.read(8), "little")
     if len(header) < 16 or root + 8 + 8 * children > size:
         raise FileError(f"{path}: the Alembic archive is truncated")
+
+
+def check_usd(path: str) -> None:
+    """In a USD file that is text, the faces of a mesh must have no more corners than it lists.
+
+    Raises:
+        FileError: they have.
+    """
+    with open(path, "rb") as file:
+        if file.read(5) != b"#usda":
+            return
+        text = file.read()
+    # A part is of one prim, up to the next.
+    for part in text.replace(b"over ", b"def ").replace(b"class ", b"def ").split(b"def "):
+        counts, indices = _USD_COUNTS.findall(part), _USD_INDICES.findall(part)
+        if len(counts) != 1 or len(indices) != 1:
+            continue
+        corners = [int(count) for count in counts[0].replace(b",", b" ").split()]
+        listed = indices[0].count(b",") + 1 if indices[0].strip() else 0
+        if min(corners, default=0) < 0 or sum(corners) > listed:
+            raise FileError(f"{path}: a mesh's faces have {sum(corners)} corners, {listed} are listed; export it again")
 
 
 def check_ply(path: str) -> None:

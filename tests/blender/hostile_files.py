@@ -451,7 +451,14 @@ USDA: dict[str, tuple[str, Outcome]] = {
     "index_beyond": (usd(indices="0,1,900"), "no faces"),
     "index_negative": (usd(indices="0,1,-1"), "no faces"),
     "counts_of_0_and_2": (usd(counts="0,2,3", indices="0,1,0,1,2"), (1.0, "no faces")),
-    "count_negative": (usd(counts="-3,3"), 1.0),
+    "count_negative": (usd(counts="-3,3"), "are listed"),
+    "corners_beyond_indices": (usd(counts="3,3"), "are listed"),
+    "count_huge": (usd(counts="2000000000"), "are listed"),
+    "no_indices": (usd(indices=""), "are listed"),
+    "second_mesh_beyond_indices": (
+        usd() + "\n" + MESH.format(counts="4", indices="0", points="", more=""),
+        "are listed",
+    ),
     "no_points": (usd(points=""), "no faces"),
     "nothing": ("#usda 1.0\n", "no mesh"),
     "nan_points": (usd(points="(0,0,0), (1,0,0), (nan,inf,0)"), "zero area"),
@@ -486,14 +493,14 @@ USDA: dict[str, tuple[str, Outcome]] = {
         'int[] protoIndices = [0, 0]\npoint3f[] positions = [(0,0,0), (3,0,0)]\ndef Scope "P" {\n'
         + usd().partition("\n")[2]
         + "\n}\n}",
-        "no mesh",
+        1.0,
     ),
     "instancer_index_beyond": (
         '#usda 1.0\ndef PointInstancer "I" {\nrel prototypes = [</I/P/Mesh>]\n'
         'int[] protoIndices = [0, 9]\npoint3f[] positions = [(0,0,0)]\ndef Scope "P" {\n'
         + usd().partition("\n")[2]
         + "\n}\n}",
-        "no mesh",
+        1.0,
     ),
     "instancer_of_itself": (
         '#usda 1.0\ndef PointInstancer "I" {\nrel prototypes = [</I>]\n'

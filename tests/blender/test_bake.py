@@ -217,6 +217,25 @@ def test_every_shader_shows_its_color(kind: str) -> None:
     assert np.abs(seen.color - of_gradient(seen.position)).max() < CLOSE
 
 
+@pytest.mark.parametrize("see_through", [False, True])
+def test_principled_that_only_shines(see_through: bool) -> None:
+    """Of a plain black base color only the emission is seen, by its strength."""
+    material = scenes.material(color=(0, 0, 0))
+    tree = material.node_tree
+    principled = next(each for each in tree.nodes if each.type == "BSDF_PRINCIPLED")
+    tree.links.new(gradient(tree), principled.inputs["Emission Color"])
+    principled.inputs["Emission Strength"].default_value = 0.5
+    if see_through:
+        half = node(tree, "ShaderNodeValue")
+        half.outputs[0].default_value = 0.5
+        tree.links.new(half.outputs[0], principled.inputs["Alpha"])
+    object_ = scenes.square(materials=[material])
+    seen = look_at(object_, baked(object_, 64)[0])
+    wanted = encode_srgb(decode_srgb(of_gradient(seen.position)) * 0.5)
+    assert np.abs(seen.color - wanted).max() < CLOSE
+    assert np.abs(seen.opacity - (0.5 if see_through else 1)).max() < CLOSE
+
+
 def test_mix_of_shaders_is_the_mix_of_their_colors() -> None:
     material = scenes.material()
     tree = material.node_tree

@@ -614,6 +614,37 @@ def test_emission(scene: Scene, strength: float) -> None:
     np.testing.assert_allclose(shown, encode_srgb(wanted), rtol=0, atol=TOLERANCE)
 
 
+@pytest.mark.parametrize("strength", [1.0, 0.4])
+def test_principled_that_only_shines(scene: Scene, strength: float) -> None:
+    """Its base color is plain black: its emission is what the artist sees."""
+    shader = scene.shader()
+    shader.inputs["Base Color"].default_value = (0, 0, 0, 1)
+    shader.inputs["Emission Strength"].default_value = strength
+    scene.link(scene.image().outputs["Color"], shader.inputs["Emission Color"])
+    surface = scene.surface()
+    shown, _ = seen(surface)
+    target = bpy.data.images.new("target", SIDE, SIDE, float_buffer=True, is_data=True)
+    scene.tree.nodes.active = scene.node("TexImage", image=target)
+    with cycles(scene.object):
+        bpy.ops.object.bake(type="EMIT", margin=0)
+    wanted = np.array(target.pixels).reshape(SIDE, SIDE, 4)[:, :, :3]
+    np.testing.assert_allclose(shown, encode_srgb(wanted), rtol=0, atol=TOLERANCE)
+    assert [image.role for image in surface.materials[0].images] == ["base color"]
+
+
+@pytest.mark.parametrize(("base", "emission", "strength"), [(0.2, 1.0, 1.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)])
+def test_emission_beside_a_base_color_does_not_count(
+    scene: Scene, base: float, emission: float, strength: float
+) -> None:
+    """Nor does one that is black or off."""
+    shader = scene.shader()
+    shader.inputs["Base Color"].default_value = (base, base, base, 1)
+    shader.inputs["Emission Color"].default_value = (emission, emission, emission, 1)
+    shader.inputs["Emission Strength"].default_value = strength
+    shown, _ = seen(scene.surface())
+    np.testing.assert_allclose(shown, encode_srgb(np.full((SIDE, SIDE, 3), base)), rtol=0, atol=TOLERANCE)
+
+
 @pytest.mark.parametrize("first", ["transparent", "principled"])
 @pytest.mark.parametrize("varies", [False, True])
 def test_mixed_with_transparent(scene: Scene, first: str, varies: bool) -> None:

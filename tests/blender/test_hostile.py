@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -20,7 +21,7 @@ from fmqm_addon.metric.settings import Settings
 
 from . import scenes
 from .hostile_files import TETRAHEDRON, Outcome, all_files
-from .script import noise, score, write_png, write_torus
+from .script import noise, read_json, score, write_png, write_torus
 
 FILES = all_files()
 TINY = Settings(samples=320, patches=5, color_units=10)
@@ -88,6 +89,22 @@ REAL: dict[str, Outcome] = {
     "tex_png_truncated/cube.obj": "base-color image is broken",
     "udim/plane_udim.blend": 1.0,
     "udim/usdUdims.usda": "holds no image",
+}
+
+
+# What Blender leaves out of some of them without a word.
+TOLD = {
+    "obj_index_out_of_range/malformed.obj": "2 of 6 faces were left out",
+    "obj_index_out_of_range/malformed2.obj": "no material file describes DefaultDoesNotExist",
+    "obj_missing_files/model2.obj": "the material file model2.mtl, which is missing",
+    "obj_mtl_file_missing/jacked.obj": "the material file nonexistent.mtl, which is missing",
+    "obj_nonmanifold_edge/nonmanifold_edge.obj": "the material file nonmanivold_edge.mtl, which is missing",
+    "obj_nonmanifold_edge/nonmanifold_vertex.obj": "the material file nonmanivold_vertex.mtl, which is missing",
+    "obj_nonmanifold_edge/nonoriented_edge.obj": "the material file nonoriented_edge.mtl, which is missing",
+    "obj_partial_vertex_colours/only_a_part_of_vertexcolors.obj": "vertex colors were left out",
+    "obj_truncated/spot_cut.obj": "1 of 4266 faces were left out",
+    "ply_two_textures/TextureDouble.ply": "names the image <this>_A.png, <this>_B.png",
+    "ply_two_textures/TextureSingle.ply": "names the image TextureDouble_A.png",
 }
 
 
@@ -206,6 +223,21 @@ def test_name_that_is_not_utf_8(tmp_path: Path, unharmed: None) -> None:
     assert expected(outcome(path), (1.0, "only names in UTF-8"))
 
 
+def test_names_in_what_the_script_writes(tmp_path: Path) -> None:
+    """A line each in the table and on stderr; JSON holds them as they are, but for bytes that are not UTF-8."""
+    names = ["two\nlines", "\x1b[31mred", os.fsdecode(b"\xff")]
+    for name in names:
+        (tmp_path / f"{name}.obj").write_text("mtllib gone.mtl\n" + TETRAHEDRON)
+    paths = [tmp_path / f"{name}.obj" for name in names]
+    done = score(paths[0], *paths, *TINY_FLAGS, "--json", tmp_path / "out.json")
+    assert len(done.stdout.splitlines()) == 1 + len(paths)
+    assert all(line.startswith("score.py: ") for line in done.stderr.splitlines())
+    assert (done.stdout + done.stderr).replace("\n", "").isprintable()
+    document = read_json(tmp_path / "out.json")
+    json.dumps(document, ensure_ascii=False).encode()  # refuses half characters, as other programs do
+    assert [pair["distorted"] for pair in document["pairs"]] == [*map(str, paths[:2]), f"{tmp_path}/\\udcff.obj"]
+
+
 # Real files
 
 
@@ -226,6 +258,15 @@ def test_real_files_in_one_process(shared_data: Path, unharmed: None) -> None:
         assert scenes.blocks() == before, name
 
 
+def test_what_is_left_out_of_real_files_is_said(shared_data: Path) -> None:
+    """Of the others that can be loaded, none says such a thing of the file itself."""
+    for name, wanted in REAL.items():
+        path = shared_data / "hostile" / name
+        if path.suffix in (".obj", ".ply") and wanted == 1.0:
+            told = " ".join(w for w in load_placed(str(path)).mesh.warnings if w.startswith(f"{path.name}: "))
+            assert bool(told) == (name in TOLD) and TOLD.get(name, "") in told, f"{name}: {told}"
+
+
 def test_real_files_in_a_process_each(shared_data: Path) -> None:
     """A line of the table or one line on stderr that names the file, and nothing else but warnings."""
 
@@ -240,9 +281,8 @@ def test_real_files_in_a_process_each(shared_data: Path) -> None:
         assert done.returncode == 1 and len(errors) == 1 and path.name in errors[0], done.stderr
         return name, errors[0]
 
-    some = sorted(REAL)[::6]  # a start takes longer than the rest; all of them are opened above
     with ThreadPoolExecutor(2) as pool:
-        for name, found in pool.map(scored, some):
+        for name, found in pool.map(scored, REAL):
             assert expected(found, REAL[name]), f"{name}: {found}"
 
 

@@ -386,6 +386,51 @@ def test_order_does_not_depend_on_the_files() -> None:
     assert scenes.same(build(["A", "B", "C"]), build(["C", "A", "B"]))
 
 
+# An asset of many parts
+
+
+def parts(rows: int = 5, columns: int = 7) -> list[bpy.types.Object]:
+    """Distinct spheres, turned, stretched, some of them mirrored, a row hanging from an empty each, all from one;
+    of three materials."""
+    top = linked(bpy.data.objects.new("Top", None))
+    top.matrix_basis = Matrix.LocRotScale((1, 2, 3), Euler((0.2, 0.3, 0.4)), (1, 1.5, 1))
+    looks = [scenes.material("Red", (0.8, 0.1, 0.1)), scenes.material("Blue", (0.1, 0.2, 0.9)), scenes.material("Grey")]
+    made = []
+    for row in range(rows):
+        holder = linked(bpy.data.objects.new(f"Row {row}", None))
+        holder.parent = top
+        holder.matrix_basis = Matrix.LocRotScale((0, 3 * row, 0), Euler((0, 0.1 * row, 0)), (1, 1, 1 + 0.1 * row))
+        for column in range(columns):
+            bpy.ops.mesh.primitive_uv_sphere_add(segments=6 + column, ring_count=4 + row, radius=1)
+            part = bpy.context.object
+            part.name = f"Part {row} {column}"
+            part.parent = holder
+            mirror = -1 if (row + column) % 2 else 1
+            part.matrix_basis = Matrix.LocRotScale((3 * column, 0, 0), Euler((0, row, column)), (1, mirror * 0.8, 0.6))
+            part.data.materials.append(looks[(row + column) % 3])
+            made.append(part)
+    return made
+
+
+def test_a_gltf_of_35_parts_is_one_asset(tmp_path: Path) -> None:
+    """Exactly 1 against itself, and the same as what Blender joins of it."""
+    made = parts()
+    corners = sum(len(polygon.vertices) - 2 for part in made for polygon in part.data.polygons)
+    glb = scenes.export(tmp_path, "glb", "parts")
+    with bpy.context.temp_override(active_object=made[0], object=made[0], selected_editable_objects=made):
+        bpy.ops.object.join()
+    joined = scenes.export(tmp_path, "blend", "joined")
+    asset = load_placed(str(glb))
+    assert len(asset.mesh.triangles) == corners
+    assert sorted(look.name for look in asset.mesh.materials) == ["Blue", "Grey", "Red"]
+    measurement = Measurement(asset.world(), Settings(samples=4000, patches=20))
+    measurement.prepare().run()
+    assert measurement.compare(asset.world()).run().scores.tolist() == [1.0] * 5
+    placement = place(asset, load_placed(str(joined)))
+    assert placement.place == "world"
+    np.testing.assert_allclose(measurement.compare(placement.mesh).run().scores, 1, atol=1e-3)
+
+
 # Hidden from rendering
 
 

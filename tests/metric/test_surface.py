@@ -216,16 +216,6 @@ def test_uv_is_interpolated_with_barycentric_coordinates() -> None:
     np.testing.assert_allclose(prepared.color_at(np.zeros(20, int), weights)[:, 0], expected, atol=1e-6)
 
 
-def test_the_border_of_a_clipped_image_is_not_black() -> None:
-    """A face whose corners all lie at (1, 1) is on the image wherever one looks."""
-    white = Texture(np.full((4, 4, 3), 255, np.uint8), "clip")
-    positions, triangles = TRIANGLE
-    mesh = MeshArrays("m", positions, triangles, np.ones((1, 3, 2)), np.zeros(1, int), materials(white))
-    prepared = prepare_surface(mesh, NaiveQuery)
-    weights = np.random.default_rng(0).dirichlet([1, 1, 1], 500)
-    assert (prepared.color_at(np.zeros(500, int), weights) == 1).all()
-
-
 def test_uvs_that_are_not_finite_are_taken_as_0() -> None:
     positions, triangles = TETRAHEDRON
     mesh = plain(positions, triangles)

@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What Blender's importers leave out of text files without a word."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+import bpy
+
+_PLY_HEADER = 1 << 16  # bytes in which texture names are looked for
+_TEXTURE = re.compile(rb"^comment +TextureFile +(.+?)\s*$", re.MULTILINE | re.IGNORECASE)
+_NAMED = 2  # of many
+_COLORED = re.compile(rb"\nv(?:[ \t]++[^\s#]++){6}")  # a vertex with a position and a color
+
+
+def left_out(path: str, colors: bool = True) -> tuple[str, ...]:
+    """What the file that the session was just filled with names or holds, and Blender has not.
+
+    The file's text is read once more, in a small part of the import's time.
+
+    Args:
+        colors: whether the file's own colors and images count.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix == ".obj":
+        return tuple(_of_obj(path, colors))
+    return tuple(_of_ply(path)) if suffix == ".ply" and colors else ()
+
+
+def _of_obj(path: str, colors: bool) -> Iterable[str]:
+    text = _lines(path)
+    faces = text.count(b"\nf ") + text.count(b"\nf\t")
+    imported = sum(len(mesh.polygons) for mesh in bpy.data.meshes)
+    if imported < faces:
+        yield f"{faces - imported} of {faces} faces were left out by Blender's importer, as broken or repeated"
+    if not colors:
+        return
+    if not any(len(mesh.color_attributes) for mesh in bpy.data.meshes) and _COLORED.search(text):
+        yield "its vertex colors were left out by Blender's importer, since not all vertices have one"
+    libraries = [os.fsdecode(name.strip(b'"')) for name in _names(text, b"mtllib")]
+    own = f"{Path(path).stem}.mtl"  # which Blender reads whether it is named or not
+    present = {name: os.path.join(os.path.dirname(path), name) for name in (*libraries, own)}
+    present = {name: found for name, found in present.items() if os.path.isfile(found) and os.access(found, os.R_OK)}
+    missing = [name for name in libraries if name not in present]
+    for name in missing[:_NAMED]:
+        yield f"names the material file {name}, which is missing or cannot be read"
+    known = {name for each in present.values() for name in _names(_lines(each), b"newmtl")}
+    used = () if missing else _names(text, b"usemtl")
+    unknown = [name.decode("utf-8", "replace") for name in used if name not in known]
+    if unknown:
+        yield f"no material file describes {', '.join(unknown[:_NAMED])}, which it uses; Blender's default is taken"
+
+
+def _lines(path: str) -> bytes:
+    """The text of a file, with a break before each line and nothing before its first word."""
+    text = b"\n" + Path(path).read_bytes()
+    return re.sub(rb"\n[ \t]+", b"\n", text) if b"\n " in text or b"\n\t" in text else text
+
+
+def _names(text: bytes, keyword: bytes) -> list[bytes]:
+    """What follows the keyword where a line begins with it, each once."""
+    found = re.findall(rb"\n" + keyword + rb"[ \t]+([^\n]*)", text)
+    return list(dict.fromkeys(name.strip() for name in found))
+
+
+def _of_ply(path: str) -> Iterable[str]:
+    with open(path, "rb") as file:
+        header = file.read(_PLY_HEADER).partition(b"end_header")[0]
+    names = [name.decode("utf-8", "replace") for name in _TEXTURE.findall(header)]
+    if names:
+        yield f"names the image {', '.join(names[:_NAMED])}, which Blender does not read from a PLY"

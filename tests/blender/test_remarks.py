@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What importers leave out without a word is said, and nothing is said of files that they take whole."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fmqm_addon.blender.files import load_placed
+from fmqm_addon.blender.images import load_texture
+from fmqm_addon.blender.mesh import AS_FOUND
+
+from .hostile_files import TETRAHEDRON
+from .script import noise, write_png, write_torus
+
+RED = "newmtl red\nKd 1 0 0\n"
+WITH_COLORS = TETRAHEDRON.replace("v 0 0 0\n", "v 0 0 0 1 0 0\n")
+
+
+def told(path: Path) -> list[str]:
+    """The warnings of the file itself, not of the objects in it."""
+    start = f"{path.name}: "
+    return [each.removeprefix(start) for each in load_placed(str(path)).mesh.warnings if each.startswith(start)]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (TETRAHEDRON, []),
+        (TETRAHEDRON.replace("v", "  v").replace("f ", " \tf\t").replace("1 3 2", "1 \\\n3 2"), []),
+        ("mtllib sub.mtl\nusemtl red\n" + TETRAHEDRON, []),
+        ('mtllib "sub.mtl"  \r\nusemtl red\r\n' + TETRAHEDRON, []),
+        ("mtllib two words.mtl\n\tusemtl red\n" + TETRAHEDRON, []),
+        (
+            "mtllib gone.mtl\nusemtl red\n" + TETRAHEDRON,
+            ["names the material file gone.mtl, which is missing or cannot be read"],
+        ),
+        ("mtllib .\n" + TETRAHEDRON, ["names the material file ., which is missing or cannot be read"]),
+        (
+            f"mtllib {'x' * 300}\nmtllib \0\n" + TETRAHEDRON,
+            [f"names the material file {name}, which is missing or cannot be read" for name in ("x" * 300, "\\x00")],
+        ),
+        (
+            "mtllib sub.mtl\nusemtl blue\nusemtl red\n" + TETRAHEDRON,
+            ["no material file describes blue, which it uses; Blender's default is taken"],
+        ),
+        (
+            TETRAHEDRON + "f 1 2 9\nf 3 3 1\n",
+            ["2 of 6 faces were left out by Blender's importer, as broken or repeated"],
+        ),
+        (WITH_COLORS, ["its vertex colors were left out by Blender's importer, since not all vertices have one"]),
+        (WITH_COLORS.replace("v 1 0 0\nv 0 1 0\nv 0 0 1", "v 1 0 0 1 1 1\nv 0 1 0 1 1 1\nv 0 0 1 0 0 0"), []),
+    ],
+)
+def test_obj(tmp_path: Path, text: str, expected: list[str]) -> None:
+    for name in ("sub.mtl", "two words.mtl"):
+        (tmp_path / name).write_text(RED)
+    path = tmp_path / "shape.obj"
+    path.write_bytes(text.encode())
+    assert told(path) == expected
+
+
+def test_the_namesake_counts_as_named(tmp_path: Path) -> None:
+    (tmp_path / "shape.mtl").write_text(RED)
+    (tmp_path / "shape.obj").write_text("usemtl red\n" + TETRAHEDRON)
+    mesh = load_placed(str(tmp_path / "shape.obj")).mesh
+    assert not mesh.warnings
+    np.testing.assert_allclose(mesh.materials[0].color.lookup(np.zeros((1, 2))), [[1, 0, 0]], atol=1e-6)
+
+
+def test_images_of_a_ply(tmp_path: Path) -> None:
+    path = tmp_path / "scan.ply"
+    path.write_text(
+        "ply\nformat ascii 1.0\ncomment TextureFile skin 1.png\nelement vertex 3\nproperty float x\nproperty float y\n"
+        "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+        "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+    )
+    assert told(path) == ["names the image skin 1.png, which Blender does not read from a PLY"]
+
+
+def test_a_given_texture_makes_missing_materials_unimportant(tmp_path: Path) -> None:
+    path = write_torus(tmp_path, "ring", "noise.png")
+    (tmp_path / "ring.mtl").unlink()
+    given = replace(AS_FOUND, texture=load_texture(str(write_png(tmp_path / "noise.png", noise()))))
+    assert told(path) == ["names the material file ring.mtl, which is missing or cannot be read"]
+    assert not load_placed(str(path), given).mesh.warnings
+
+
+def test_names_of_many_lines_are_one_line_in_warnings(tmp_path: Path) -> None:
+    path = tmp_path / "two\nlines.obj"
+    path.write_text("mtllib gone.mtl\n" + TETRAHEDRON)
+    assert load_placed(str(path)).mesh.warnings[0].startswith("two\\nlines.obj: names the material file")
