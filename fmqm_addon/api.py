@@ -35,6 +35,7 @@ def measure(
     repeats: int = 1,
     reference_without_modifiers: bool = False,
     both: bool = False,
+    attribution: bool = False,
     bake: int = AS_FOUND.bake,
 ) -> list[Outcome]:
     """Scores of objects or collections against a reference.
@@ -48,6 +49,7 @@ def measure(
         reference_without_modifiers: the reference is its mesh without modifiers, so that an object can be
             measured against itself.
         both: score the other direction too: `outcome.reverse`, (5,) float64 like the scores.
+        attribution: score geometry and texture apart too: `outcome.attribution`, whose loss it is.
         bake: side in pixels of the images onto which materials are baked that cannot be read; 0 forbids it.
 
     Returns:
@@ -64,6 +66,7 @@ def measure(
         space,
         match_scale,
         both,
+        attribution,
         Reading(bake=bake),
     )
     return stepper.run()

@@ -13,6 +13,7 @@ from ..metric.settings import Settings
 from ..metric.spatial import Floats
 from ..metric.surface import Surface
 from ..metric.trust import Trust
+from .attribution import Attribution, attribute
 from .images import TextureCache
 from .material import Reading
 from .measure import Comparison, Measurement
@@ -35,6 +36,7 @@ class Outcome:
         seconds: by report.pair.STAGES; reading and preparing the reference count in the first outcome.
         fingerprint: of reference and compared, as they were when they were read; see pair_fingerprint.
         reverse: (5,) float64 scores of the other direction, where they were asked for.
+        attribution: whose loss it is, where that was asked for.
         error: why there is no score.
     """
 
@@ -48,6 +50,7 @@ class Outcome:
     seconds: dict[str, float] = field(default_factory=dict)
     fingerprint: tuple[str, str] = ("", "")
     reverse: Floats | None = None
+    attribution: Attribution | None = None
     error: str | None = None
 
     @property
@@ -81,6 +84,7 @@ def measuring(
     space: str = "auto",
     match_scale: bool = False,
     both: bool = False,
+    attribution: bool = False,
     reading: Reading = AS_FOUND,
     finished: Callable[[Outcome], None] = lambda _: None,
 ) -> Stepper[list[Outcome]]:
@@ -93,10 +97,13 @@ def measuring(
         repeats: seeds settings.seed to settings.seed + repeats - 1.
         space, match_scale: as in blender.space.place.
         both: score the other direction too.
+        attribution: score geometry and texture apart too.
         reading: how the materials are read.
         finished: gets each outcome as soon as it is there.
     """
-    return Stepper(_work(reference, compared, settings, repeats, space, match_scale, both, reading, finished))
+    return Stepper(
+        _work(reference, compared, settings, repeats, space, match_scale, both, attribution, reading, finished)
+    )
 
 
 def _work(
@@ -107,6 +114,7 @@ def _work(
     space: str,
     match_scale: bool,
     both: bool,
+    attribution: bool,
     reading: Reading,
     finished: Callable[[Outcome], None],
 ) -> Work[list[Outcome]]:
@@ -137,7 +145,7 @@ def _work(
             try:
                 placement = place(original.placed, item.placed, space, match_scale)
                 comparing = measurement.compare(placement.mesh, known_facts(placement, reading))
-                one = share / 2 if both else share
+                one = share / (1 + both + 2 * attribution)
                 while comparing.step():
                     yield Progress(f"Measuring {item.target.label}", began + one * comparing.progress.done)
                 seconds = _added(seconds, comparing.seconds)
@@ -148,6 +156,14 @@ def _work(
                         yield Progress(f"Measuring from {item.target.label}", began + one * (1 + turned.progress.done))
                     reverse = turned.result
                     seconds = _added(seconds, turned.seconds)
+                whose = None
+                if attribution:
+                    attributing = attribute(measurement, original.placed.world(), placement.mesh, comparing.result)
+                    while attributing.step():
+                        done = began + one * (1 + both + 2 * attributing.progress.done)
+                        yield Progress(f"Attributing {item.target.label}", done)
+                    whose = attributing.result
+                    seconds = _added(seconds, attributing.seconds)
                 outcome = Outcome(
                     reference,
                     item.target,
@@ -158,6 +174,7 @@ def _work(
                     reference_triangles=len(original.placed.mesh.triangles),
                     fingerprint=(original.mark(placement), item.mark(placement)),
                     reverse=reverse,
+                    attribution=whose,
                     seconds={**seconds, "total": sum(seconds.values())},
                 )
             except FMQMError as reason:

@@ -75,6 +75,7 @@ class FMQM_OT_measure(SteppedOperator, bpy.types.Operator):  # noqa: N801
             settings,
             **asked,
             both=fmqm.settings.both,
+            attribution=fmqm.settings.attribution,
         )
         return True
 
@@ -141,6 +142,7 @@ def _write_row(fmqm: FMQMScene, outcome: Outcome, settings_text: str) -> None:
     row.scores = "" if comparison is None else numbers_text(comparison.scores)
     row.stderr = "" if comparison is None or comparison.stderr is None else numbers_text(comparison.stderr)
     row.reverse = "" if outcome.reverse is None else numbers_text(outcome.reverse)
+    row.attribution = "" if outcome.attribution is None else json.dumps(outcome.attribution.as_dict(), allow_nan=False)
     row.trust = "" if outcome.trust is None else json.dumps(trust_dict(outcome.trust), allow_nan=False)
     row.patches = 0 if comparison is None else len(comparison.result.patches)
     row.samples = 0 if comparison is None else len(comparison.result.samples.positions)

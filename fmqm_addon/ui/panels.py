@@ -14,7 +14,7 @@ from ..report.pair import SHOWN
 from ..report.trust import trust_lines
 from . import session
 from .measuring import why_not
-from .properties import FMQMItem, FMQMRow, row_reverse, row_scores, row_stderr, row_trust
+from .properties import FMQMItem, FMQMRow, row_attribution, row_reverse, row_scores, row_stderr, row_trust
 from .results import EXPLAINED, active_row
 from .scene import FMQMScene
 
@@ -201,6 +201,7 @@ class FMQM_PT_settings(_Sidebar, bpy.types.Panel):  # noqa: N801
         column.prop(settings, "space")
         column.prop(settings, "match_scale")
         column.prop(settings, "both")
+        column.prop(settings, "attribution")
         column = layout.column(align=True)
         column.prop(settings, "seed")
         column.prop(settings, "repeats")
@@ -316,6 +317,12 @@ def _draw_row(layout: bpy.types.UILayout, context: bpy.types.Context, fmqm: FMQM
         split = column.split(factor=0.5, align=True)
         split.label(text="    FMQM Reversed")
         split.label(text=f"{reverse['FMQM']:.4f}")
+    attribution = row_attribution(row)
+    if attribution is not None:
+        for label, key in (("Geometry Loss", "geometry_loss"), ("Texture Loss", "texture_loss")):
+            split = column.split(factor=0.5, align=True)
+            split.label(text=f"    {label}")
+            split.label(text=f"{attribution[key]:.4f}")
     reference = f"{row.reference_name} (no modifiers)" if row.bare_reference else row.reference_name
     for label, text in (
         ("Against", reference),
@@ -326,6 +333,9 @@ def _draw_row(layout: bpy.types.UILayout, context: bpy.types.Context, fmqm: FMQM
         split = column.split(factor=0.5, align=True)
         split.label(text=f"    {label}")
         split.label(text=text, translate=False)
+    if attribution is not None:
+        phrase = attribution["phrase"]
+        wrapped(layout, context, phrase[:1].upper() + phrase[1:], icon="INFO")
     if row.warnings:
         box = layout.box().column()
         for warning in row.warnings.splitlines():

@@ -72,6 +72,7 @@ class FMQMRow(bpy.types.PropertyGroup):
     space: StringProperty(name="Space", description="Where the two were compared")
     settings: StringProperty(name="Settings", description="Settings of the measurement, as JSON")
     reverse: StringProperty(name="Reverse", description="Scores of the other direction, as JSON; empty: not measured")
+    attribution: StringProperty(name="Attribution", description="Whose loss it is, as JSON; empty: not measured")
     trust: StringProperty(name="Trust", description="How far to trust the scores: facts with their units, as JSON")
     fingerprint: StringProperty(name="Fingerprint", description="Tells whether what was measured has changed since")
 
@@ -89,6 +90,12 @@ def row_stderr(row: FMQMRow) -> dict[str, float] | None:
 def row_reverse(row: FMQMRow) -> dict[str, float] | None:
     """Scores of the other direction, the compared as the reference; None where they were not measured."""
     return _columns(row.reverse)
+
+
+def row_attribution(row: FMQMRow) -> dict[str, Any] | None:
+    """Whose loss it is, as blender.attribution.Attribution.as_dict has it; None where that was not measured."""
+    found: dict[str, Any] | None = json.loads(row.attribution) if row.attribution else None
+    return found
 
 
 def row_trust(row: FMQMRow) -> Report | None:
@@ -250,11 +257,18 @@ class FMQMSettings(bpy.types.PropertyGroup):
         description="Score the compared as the reference too, which sees what only it has. Takes twice as long",
         default=False,
     )
+    attribution: BoolProperty(
+        name="Attribution",
+        description="Score geometry and texture apart too: whose loss it is. Takes three times as long",
+        default=False,
+    )
 
 
 # In the order in which operator presets save them; space and seed are the scene's, not a preset's.
 PRESET_PROPERTIES = tuple(
-    name for name in FMQMSettings.__annotations__ if name not in {"preset", "seed", "space", "match_scale", "both"}
+    name
+    for name in FMQMSettings.__annotations__
+    if name not in {"preset", "seed", "space", "match_scale", "both", "attribution"}
 )
 _PAPER: dict[str, Any] = {
     **{name: getattr(Settings(), name) for name in SETTING_NAMES if name not in {"seed", "scored_patches"}},

@@ -19,7 +19,7 @@ from ..report.fields import save_fields
 from ..report.files import write_text
 from ..report.pair import SHOWN, PairScore, csv_text, json_text, table_text
 from . import session, watch
-from .properties import FMQMRow, row_reverse, row_scores, row_stderr, row_trust
+from .properties import FMQMRow, row_attribution, row_reverse, row_scores, row_stderr, row_trust
 from .scene import FMQMScene
 
 # What an artist should know of each number: label, and what a low value looks like.
@@ -53,6 +53,7 @@ def active_row(fmqm: FMQMScene) -> FMQMRow | None:
 def pair_of(row: FMQMRow) -> PairScore:
     """A row as the reports want it."""
     reference, target = watch.row_targets(row)
+    attribution = row_attribution(row)
     return PairScore(
         reference=reference.label,
         distorted=target.label,
@@ -66,6 +67,7 @@ def pair_of(row: FMQMRow) -> PairScore:
         space=row.space or None,
         reverse=_array(row_reverse(row)),
         trust=row_trust(row),
+        findings={} if attribution is None else {"attribution": attribution},
     )
 
 

@@ -382,13 +382,14 @@ def test_presets() -> None:
 
 
 def test_operator_presets(fmqm: ui.scene.FMQMScene) -> None:
-    fmqm.settings.color_units = 77
+    fmqm.settings.color_units, fmqm.settings.attribution = 77, True
     assert bpy.ops.fmqm.preset_add(name="Mine") == {"FINISHED"}
     paths = bpy.utils.preset_paths("fmqm")
     saved = Path(paths[0]) / "Mine.py"
-    fmqm.settings.preset = "PAPER"
+    fmqm.settings.preset, fmqm.settings.attribution = "PAPER", False
     bpy.ops.script.execute_preset(filepath=str(saved), menu_idname="FMQM_PT_presets")
     assert fmqm.settings.color_units == 77 and fmqm.settings.preset == "CUSTOM"
+    assert fmqm.settings.attribution is False, "what is measured besides is not a preset's"
     saved.unlink()
 
 
@@ -396,7 +397,7 @@ def test_every_flag_of_the_script_is_a_property() -> None:
     from fmqm_addon.metric.settings import SETTING_NAMES
 
     properties = bpy.context.scene.fmqm.settings.bl_rna.properties
-    for name in (*SETTING_NAMES, "repeats", "space", "match_scale", "preset"):
+    for name in (*SETTING_NAMES, "repeats", "space", "match_scale", "both", "attribution", "preset"):
         assert name in properties
 
 

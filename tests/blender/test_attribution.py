@@ -5,17 +5,27 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import MagicMock
 
+import bpy
 import numpy as np
 import pytest
 
+import fmqm_addon
+from fmqm_addon import api
 from fmqm_addon.blender.attribution import Attribution, attribute
 from fmqm_addon.blender.files import load_mesh
+from fmqm_addon.blender.job import measuring
 from fmqm_addon.blender.measure import Measurement
+from fmqm_addon.blender.snapshot import target_of
 from fmqm_addon.metric.settings import PRESETS, Settings
 from fmqm_addon.metric.surface import MeshArrays
+from fmqm_addon.ui import inputs, panels
+from fmqm_addon.ui.properties import row_attribution
 
-from .script import noise, score, strict_json, write_png, write_torus
+from . import scenes
+from .script import noise, read_json, score, strict_json, write_png, write_torus
 
 SMALL = Settings(samples=6400, patches=40, color_units=20)
 
@@ -120,3 +130,77 @@ def test_script_attributes_and_explains(tmp_path: Path) -> None:
     assert pair["explanation"] in done.stdout and "Most of the loss is the geometry" in pair["explanation"]
     assert 0 < pair["where"]["below_mean"] < 1 and len(pair["where"]["worst"]) == 3
     assert failed["explanation"] in done.stdout and failed["explanation"].startswith("Not scored: ")
+
+
+@pytest.fixture
+def monkeys(tmp_path: Path, empty_session: None) -> list[bpy.types.Object]:
+    """The original and one with another texture, which has been set aside."""
+    images = [scenes.write_png(tmp_path / f"{seed}.png", noise(32, seed=seed)) for seed in (1, 2)]
+    made = [scenes.monkey(image.stem, [scenes.textured(image)]) for image in images]
+    made[1].location.x += 5
+    return made
+
+
+def test_the_button_attributes_as_the_script_does(monkeys: list[bpy.types.Object], tmp_path: Path) -> None:
+    """In the row, on the panel and in the saved file; nothing of it where it was not asked for."""
+    fmqm_addon.register()
+    try:
+        fmqm = bpy.context.scene.fmqm
+        fmqm.settings.samples, fmqm.settings.patches, fmqm.settings.color_units = 6400, 40, 20
+        inputs.set_reference(fmqm, monkeys[0])
+        inputs.set_compared(fmqm, monkeys[1:])
+        (saved,) = measured_and_saved(tmp_path / "without.json")
+        assert "attribution" not in saved and row_attribution(fmqm.rows[0]) is None
+        assert not any("Loss" in text for text in said())
+        fmqm.settings.attribution = True
+        (saved,) = measured_and_saved(tmp_path / "with.json")
+        found = saved["attribution"]
+        assert found == row_attribution(fmqm.rows[0])
+        assert found["mostly"] == "texture" and found["texture_loss"] > 0.1 and found["geometry_loss"] < 0.001
+        texts = said()
+        assert texts[texts.index("    Geometry Loss") + 1] == f"{found['geometry_loss']:.4f}"
+        assert texts[texts.index("    Texture Loss") + 1] == f"{found['texture_loss']:.4f}"
+        assert "Most of the loss is the texture" in texts
+    finally:
+        fmqm_addon.unregister()
+    blend = scenes.export(tmp_path, "blend")
+    flags = ("--samples", 6400, "--patches", 40, "--color-units", 20, "--quiet", "--attribution")
+    done = score(*(f"{blend}:{monkey.name}" for monkey in monkeys), *flags, "--json", tmp_path / "script.json")
+    assert done.returncode == 0, done.stderr
+    assert read_json(tmp_path / "script.json")["pairs"][0]["attribution"] == found
+
+
+def measured_and_saved(path: Path) -> list[dict[str, object]]:
+    assert bpy.ops.fmqm.measure() == {"FINISHED"}
+    assert bpy.ops.fmqm.save_results(filepath=str(path), file_format="json") == {"FINISHED"}
+    pairs: list[dict[str, object]] = read_json(path)["pairs"]
+    return pairs
+
+
+def said() -> list[str]:
+    """What the panel of the results says."""
+    layout = MagicMock()
+    for part in (layout.column, layout.row, layout.split):
+        part.return_value = layout
+    context = SimpleNamespace(
+        scene=bpy.context.scene,
+        region=SimpleNamespace(width=400),
+        preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)),
+    )
+    panels.FMQM_PT_results.draw(SimpleNamespace(layout=layout), context)
+    return [call.kwargs["text"] for call in layout.label.call_args_list]
+
+
+def test_attribution_from_python_and_its_progress(monkeys: list[bpy.types.Object]) -> None:
+    """It is the last part of an object's share, after the other direction, and changes no score."""
+    plain = api.measure(*monkeys, SMALL, both=True)[0]
+    stepper = measuring(target_of(monkeys[0]), [target_of(monkeys[1])], SMALL, both=True, attribution=True)
+    seen = [("", 0.0)]
+    while stepper.step():
+        seen.append((stepper.progress.stage, stepper.progress.done))
+    assert [done for _, done in seen] == sorted(done for _, done in seen) and 0.95 < seen[-1][1] <= 1
+    assert list(dict.fromkeys(stage for stage, _ in seen))[-2:] == ["Measuring from 2", "Attributing 2"]
+    (outcome,) = stepper.result
+    assert plain.attribution is None and outcome.attribution is not None
+    assert np.array_equal(plain.scores, outcome.scores) and np.array_equal(plain.reverse, outcome.reverse)
+    assert api.measure(*monkeys, SMALL, attribution=True)[0].attribution == outcome.attribution
