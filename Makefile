@@ -23,8 +23,9 @@ extension: $(VENV)/runs
 	$(EXTENSION_TOOL) build --source-dir . --output-dir dist
 	$(EXTENSION_TOOL) validate dist/fmqm-$$(sed -n 's/^version = "\(.*\)"/\1/p' blender_manifest.toml).zip
 
+# The files go to as many processes as there are cores. ARGS="-n 0 -m program": one after the other.
 test: $(VENV)/tests
-	$(RUN) -m pytest $(ARGS)
+	$(RUN) -m pytest -n auto --dist loadfile $(ARGS)
 
 # Both Blender versions, as far as their Pythons are there.
 test-all:
