@@ -259,7 +259,7 @@ class FMQMSettings(bpy.types.PropertyGroup):
     )
     attribution: BoolProperty(
         name="Attribution",
-        description="Score geometry and texture apart too: whose loss it is. Takes three times as long",
+        description="Score geometry and texture apart too: whose loss it is. Takes up to three times as long",
         default=False,
     )
 
