@@ -100,8 +100,9 @@ def test_memory_is_told_by_proc_and_by_ps(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 PARENT = """
-import sys
+import signal, sys
 from pathlib import Path
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
 sys.path.insert(0, sys.argv[1])
 from tests.batch.test_workers import tasks_of, watch
 try:

@@ -131,7 +131,7 @@ def test_given_texture_needs_uvs(monkeys: Path, tmp_path: Path, kind: str) -> No
     assert str(path) in str(caught.value)
 
 
-# Objects of a .blend
+# Objects of a file
 
 
 @pytest.mark.parametrize(
@@ -147,7 +147,8 @@ def test_given_texture_needs_uvs(monkeys: Path, tmp_path: Path, kind: str) -> No
         (r"C:\models\a.blend:Cube", (r"C:\models\a.blend", "Cube")),
         (r"C:\models\a.obj", (r"C:\models\a.obj", "")),
         ("D:/a b/c.blend:C:x", ("D:/a b/c.blend", "C:x")),
-        ("a.obj:Cube", ("a.obj:Cube", "")),
+        ("a.obj:Cube", ("a.obj", "Cube")),
+        ("a.txt:Cube", ("a.txt:Cube", "")),
         ("a.blender/b.blend:Cube", ("a.blender/b.blend", "Cube")),
         ("a.blend:", ("a.blend:", "")),
     ],
