@@ -34,6 +34,7 @@ from fmqm_addon.blender.process import blender_version, require_bpy, stop_on_sig
 from fmqm_addon.blender.space import SPACES
 from fmqm_addon.metric.errors import FMQMError, SettingsError, one_line
 from fmqm_addon.metric.settings import CENTERS, COLOR_SPACES, POOLINGS, PRESETS, SETTING_NAMES, Settings
+from fmqm_addon.report.explain import explain
 from fmqm_addon.report.files import check_writable, write_parts
 from fmqm_addon.report.junit import below, junit_parts
 from fmqm_addon.report.page import write_page
@@ -400,7 +401,8 @@ def _write(
         if args.verbose:
             out.writelines(trust_parts(records))
         if args.explain:
-            out.writelines(f"\n{record['explanation']}\n" for record in records)
+            # A pair without scores of its own process, such as a lost one, comes without an explanation.
+            out.writelines(f"\n{record.get('explanation') or explain(record)}\n" for record in records)
         if args.json:
             write_parts(args.json, json_parts(records, settings, versions))
     if args.csv:

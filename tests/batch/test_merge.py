@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""scripts/score.py --merge on parts made by hand: no Blender, no scores."""
+
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fmqm_addon.report.pair import PairScore, pair_record
+from scripts.score import main
+
+HEAD = {"fmqm_version": "1", "blender_version": "4", "settings": {}}
+
+
+def write_part(folder: Path, *names: str, **more: Any) -> str:
+    """A part in which all scores are 0.5."""
+    scores = dict.fromkeys(("FMQM", "geoSSIM", "geoGraSSIM", "colorSSIM", "colorGraSSIM"), 0.5)
+    records = [pair_record(PairScore("r", name, patches=200)) | scores | {"settings": {}, "fail_under": None} for name in names]
+    (folder / "part.json").write_text(json.dumps(HEAD | {"pairs": [record | more for record in records]}))
+    return str(folder / "part.json")
+
+
+def write_manifest(folder: Path, text: str) -> str:
+    (folder / "pairs.csv").write_text(text)
+    return str(folder / "pairs.csv")
+
+
+def test_what_comes_without_an_explanation_gets_one(tmp_path: Path) -> None:
+    manifest = write_manifest(tmp_path, "reference,distorted\nr,a\nr,b\n")
+    out = io.StringIO()
+    outputs = ["--explain", "--csv", str(tmp_path / "c")]
+    assert main(["--merge", write_part(tmp_path, "a"), "--manifest", manifest, *outputs], out) == 1
+    assert "none of the merged parts has it" in out.getvalue() and "very different" in out.getvalue()
+    assert (tmp_path / "c").exists()
