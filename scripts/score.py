@@ -323,6 +323,8 @@ def _score(
     with _folder_of_workers(path) as folder:
         if args.resume:
             adopt(folder, journal)
+        elif path:  # what a run that was killed has left
+            shutil.rmtree(folder, ignore_errors=True)
         waiting = {
             key: Task(key, row)
             for key, row in zip(keys, rows, strict=True)

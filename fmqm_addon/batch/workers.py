@@ -186,6 +186,8 @@ class _Worker:
         self._shard = shard
         self._read = 0  # bytes of its journal
         self._heard = time.monotonic()
+        # A run that was killed may have left one of the same name, which would be read as this worker's.
+        Path(journal_of(str(shard))).unlink(missing_ok=True)
         shard.write_text(json.dumps([task.as_dict() for task in tasks]), encoding="utf-8")
         with open(shard.with_suffix(".log"), "wb") as log:
             # Its input is a pipe that nothing is written to: it closes when this process ends, however it does.

@@ -79,6 +79,16 @@ def test_a_pair_that_fails_once_is_tried_once_more(tmp_path: Path) -> None:
     assert all(journal.record(f"k{number}")["error"] is None for number in range(3))
 
 
+def test_what_a_killed_run_has_left_is_not_the_new_runs(tmp_path: Path) -> None:
+    for number in range(1, 4):
+        stale = Journal(journal_of(str(tmp_path / f"shard-{number}.json")))
+        stale.done("k0", {"id": "0", "FMQM": 0.1, "error": None})
+        stale.done("other", {"id": "other", "FMQM": 0.1, "error": None})
+        stale.close()
+    journal = watch(tmp_path, tasks_of("fine", "fine"))
+    assert finished(tmp_path) == Counter(["k0", "k1"]) and journal.record("k0")["FMQM"] == 0.5
+
+
 def test_workers_that_never_begin_are_the_runs_error(tmp_path: Path) -> None:
     with pytest.raises(FMQMError, match="workers end before their first pair .no Blender here."):
         watch(tmp_path, tasks_of("fine", "fine"), told="refuse")
