@@ -100,21 +100,23 @@ def to_bake(objects: Sequence[bpy.types.Object], reading: Reading, cache: Textur
     if not reading.bake:
         return ()
     with evaluated(objects) as found:
-        materials = {
-            slot.material.name: slot.material
+        names = {
+            slot.material.name
             for each in shown(found)
             if not each.particle
             for slot in each.object.material_slots
-            if slot.material is not None
+            if slot.material is not None and _is_unread(slot.material, each.object.data, reading, cache)
         }
-        return tuple(name for name in sorted(materials) if _is_unread(materials[name], reading, cache))
+    return tuple(sorted(names))
 
 
-def _is_unread(material: bpy.types.Material, reading: Reading, cache: TextureCache) -> bool:
+def _is_unread(material: bpy.types.Material, data: bpy.types.ID, reading: Reading, cache: TextureCache) -> bool:
+    """Whether a material must be baked on what an object shows, a mesh or what becomes one."""
     try:
-        return isinstance(read_look(material, cache, reading), Unread)
+        look = read_look(material, cache, reading)
     except MeshError:  # mesh_arrays says so, if a face has it
         return False
+    return isinstance(look, Unread) or (isinstance(data, bpy.types.Mesh) and _odd_attribute(data, look) is not None)
 
 
 @dataclass(frozen=True)
@@ -255,6 +257,9 @@ def _read_slot(
         look: Look | Unread = _VERTEX_COLORS
     else:
         look = read_look(material, cache, reading)
+        odd = _odd_attribute(mesh, look) if isinstance(look, Look) else None
+        if isinstance(look, Look) and odd is not None:
+            look = Unread(odd, "is an attribute of a kind that is not read", look.material.images, look.warnings)
     missing = []
     values = [np.empty((*cut.loops[rows].shape, 0), np.float32)]
     for layer in () if isinstance(look, Unread) else look.layers:
@@ -265,6 +270,13 @@ def _read_slot(
         values.append(found)
     corners = values[-1] if len(values) <= 2 else np.concatenate(values, axis=2)
     return _Slot(material, look, rows, corners, tuple(missing))
+
+
+def _odd_attribute(mesh: bpy.types.Mesh, look: Look) -> str | None:
+    """An attribute that a look wants and that the mesh has, but neither as a UV map nor as a color attribute: Cycles
+    reads those of any domain and type, which Geometry Nodes make."""
+    names = (layer.name for layer in look.layers if layer.name in mesh.attributes and _layer_of(mesh, layer) is None)
+    return next(names, None)
 
 
 def _missing(layer: Layer, material: bpy.types.Material | None) -> str:
@@ -284,6 +296,10 @@ def _layer_values(mesh: bpy.types.Mesh, layer: Layer, cut: _Triangles, rows: _Ro
         return None
     linear = _read(colors.data, "color", (len(colors.data), 4), np.float32)
     return linear[(cut.loops if colors.domain == "CORNER" else cut.vertices)[rows]]
+
+
+def _layer_of(mesh: bpy.types.Mesh, layer: Layer) -> bpy.types.MeshUVLoopLayer | bpy.types.Attribute | None:
+    return _uv_map(mesh, layer.name) if layer.kind == "uv" else _color_attribute(mesh, layer.name)
 
 
 def _uv_map(mesh: bpy.types.Mesh, name: str) -> bpy.types.MeshUVLoopLayer | None:

@@ -13,8 +13,9 @@ import pytest
 from mathutils import Matrix
 
 from fmqm_addon.blender.bvh import BVHQuery
+from fmqm_addon.blender.images import TextureCache
 from fmqm_addon.blender.material import Reading
-from fmqm_addon.blender.mesh import mesh_arrays
+from fmqm_addon.blender.mesh import mesh_arrays, to_bake
 from fmqm_addon.metric.color import Texture
 from fmqm_addon.metric.errors import MeshError
 from fmqm_addon.metric.surface import prepare_surface
@@ -332,6 +333,28 @@ def test_a_material_that_wants_uvs_where_there_are_none_is_read_at_0() -> None:
     assert arrays.corners[:2].any() and not arrays.corners[2:].any()
     assert len(arrays.warnings) == 1
     assert arrays.warnings[0].startswith("Bald 0, Bald 1 and 3 more: the mesh has no UV map, which material Textured")
+
+
+@pytest.mark.parametrize("kind, domain", [("FLOAT_COLOR", "FACE"), ("FLOAT_VECTOR", "POINT"), ("FLOAT", "FACE")])
+def test_attributes_of_any_kind_are_baked(kind: str, domain: str) -> None:
+    """Geometry Nodes make them, and Cycles reads them: they are neither black nor said to be missing."""
+    made = scenes.material("Painted")
+    node = made.node_tree.nodes.new("ShaderNodeAttribute")
+    node.attribute_name = "tint"
+    made.node_tree.links.new(node.outputs["Color"], scenes.base_color(made))
+    object_ = scenes.square(materials=[made])
+    for each in object_.data.attributes.new("tint", kind, domain).data:
+        if kind == "FLOAT_COLOR":
+            each.color = (0.5, 0.5, 0.5, 1)
+        elif kind == "FLOAT":
+            each.value = 0.5
+        else:
+            each.vector = (0.5, 0.5, 0.5)
+    assert to_bake([object_], Reading(bake=64), TextureCache()) == ("Painted",)
+    arrays = mesh_arrays([object_], "asset", Reading(bake=64))
+    assert arrays.materials[0].how == "baked" and not any("has no" in warning for warning in arrays.warnings)
+    color = prepare_surface(arrays, BVHQuery).color_at(np.arange(2), np.full((2, 3), 1 / 3))
+    assert color == pytest.approx(0.735357, abs=0.01)
 
 
 def test_uvs_that_are_not_finite_still_give_a_color() -> None:
