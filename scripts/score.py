@@ -243,6 +243,10 @@ def _check_arguments(args: argparse.Namespace) -> None:
         raise SettingsError("--resume needs --journal, or an output file beside which the journal is")
     if args.shard:
         _shard(args.shard)
+    scoring = ("jobs", "dask", "resume", "save_fields", "picture", "both", "attribution")
+    ignored = [flag for flag in scoring if args.merge and getattr(args, flag)]
+    if ignored:
+        raise SettingsError(f"--merge scores nothing; leave out {_flag(ignored)}")
     for flag in ("save_fields", "picture"):
         if not getattr(args, flag):
             continue
@@ -306,7 +310,7 @@ def _journal_path(args: argparse.Namespace) -> str | None:
 
 
 def _merge(args: argparse.Namespace, rows: list[Row] | None, out: TextIO) -> int:
-    merged = Merged(args.merge, rows, Log(PROGRAM, 1, 1))
+    merged = Merged(args.merge, rows, Log(PROGRAM, 1, 1), args.fail_under)
     _write(args, merged, merged.settings, merged.versions, out)
     return _exit_code(merged)
 

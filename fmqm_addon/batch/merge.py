@@ -23,6 +23,7 @@ class Merged:
     Args:
         rows: give the order, and which there should be; None takes the parts as they are.
         log: is told of ids that are there twice (the first counts), missing, or not among the rows.
+        fail_under: of pairs whose row has none; None leaves those of the parts.
 
     Attributes:
         settings, versions: as json_parts wants them.
@@ -31,8 +32,11 @@ class Merged:
         FileError: a part is not such an output, or was scored at other settings or by another version.
     """
 
-    def __init__(self, paths: Sequence[str], rows: Sequence[Row] | None, log: Log) -> None:
+    def __init__(
+        self, paths: Sequence[str], rows: Sequence[Row] | None, log: Log, fail_under: float | None = None
+    ) -> None:
         self._journal = Journal()
+        self._fail_under = fail_under
         self._rows = {row.id: row for row in rows or ()}
         self._ids: list[str] = []
         first: dict[str, Any] = {}
@@ -54,12 +58,14 @@ class Merged:
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
         for name in self._ids:
+            row = self._rows.get(name)
+            limit = self._fail_under if row is None or row.fail_under is None else row.fail_under
             if name in self._journal:
-                yield self._journal.record(name)
-            else:
-                row = self._rows[name]
+                record = self._journal.record(name)
+                yield record if limit is None else record | {"fail_under": limit}
+            elif row is not None:
                 gap = PairScore(row.reference, row.distorted, error=f"{name}: none of the merged parts has it")
-                yield pair_record(gap) | {"id": name, "settings": dict(row.settings), "fail_under": row.fail_under}
+                yield pair_record(gap) | {"id": name, "settings": dict(row.settings), "fail_under": limit}
 
     def _add(self, record: dict[str, Any], path: str, log: Log) -> None:
         name = record["id"]

@@ -19,7 +19,9 @@ HEAD = {"fmqm_version": "1", "blender_version": "4", "settings": {}}
 def write_part(folder: Path, *names: str, **more: Any) -> str:
     """A part in which all scores are 0.5."""
     scores = dict.fromkeys(("FMQM", "geoSSIM", "geoGraSSIM", "colorSSIM", "colorGraSSIM"), 0.5)
-    records = [pair_record(PairScore("r", name, patches=200)) | scores | {"settings": {}, "fail_under": None} for name in names]
+    records = [
+        pair_record(PairScore("r", name, patches=200)) | scores | {"settings": {}, "fail_under": None} for name in names
+    ]
     (folder / "part.json").write_text(json.dumps(HEAD | {"pairs": [record | more for record in records]}))
     return str(folder / "part.json")
 
@@ -36,3 +38,32 @@ def test_what_comes_without_an_explanation_gets_one(tmp_path: Path) -> None:
     assert main(["--merge", write_part(tmp_path, "a"), "--manifest", manifest, *outputs], out) == 1
     assert "none of the merged parts has it" in out.getvalue() and "very different" in out.getvalue()
     assert (tmp_path / "c").exists()
+
+
+@pytest.mark.parametrize(
+    ("recorded", "limit", "rows", "code"),
+    [
+        (None, (), "", 0),
+        (None, ("--fail-under", "0.4"), "", 0),
+        (None, ("--fail-under", "0.6"), "", 1),
+        (0.6, (), "", 1),
+        (None, (), "r,a,0.6\n", 1),
+        (0.6, ("--fail-under", "0.7"), "r,a,0\n", 0),
+        (None, ("--fail-under", "0.6"), "r,a,\n", 1),
+    ],
+)
+def test_limits_of_the_manifest_and_the_arguments_count(
+    tmp_path: Path, recorded: float | None, limit: tuple[str, ...], rows: str, code: int
+) -> None:
+    manifest = ("--manifest", write_manifest(tmp_path, f"reference,distorted,fail_under\n{rows}")) if rows else ()
+    part = write_part(tmp_path, "a", fail_under=recorded)
+    assert main(["--merge", part, *manifest, *limit], io.StringIO()) == code
+
+
+@pytest.mark.parametrize("flag", [("--jobs", "2"), ("--resume",), ("--both",), ("--picture", "p.png")])
+def test_what_only_scoring_does_is_refused(
+    tmp_path: Path, flag: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["--merge", write_part(tmp_path, "a"), *flag, "--csv", str(tmp_path / "c")], io.StringIO())
+    assert ended.value.code == 2 and f"leave out {flag[0]}" in capsys.readouterr().err
