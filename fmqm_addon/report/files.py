@@ -14,13 +14,13 @@ from ..metric.errors import FileError
 
 @contextmanager
 def replaced(path: str) -> Iterator[str]:
-    """A temporary path beside the file, which takes the file's place once it has been written.
+    """A temporary path beside the file, which takes the file's place once it has been written; links stay links.
 
     Raises:
         FileError: it cannot be written; what stood there is left as it was.
     """
     check_writable(path)
-    target = Path(path)
+    target = Path(os.path.realpath(path))
     temporary = ""
     try:
         handle, temporary = tempfile.mkstemp(suffix=target.suffix, prefix=f".{target.name}.", dir=target.parent)
@@ -29,7 +29,7 @@ def replaced(path: str) -> Iterator[str]:
         umask = os.umask(0)
         os.umask(umask)
         os.chmod(temporary, 0o666 & ~umask)
-        os.replace(temporary, path)
+        os.replace(temporary, target)
     except OSError as error:
         raise FileError(f"{path}: cannot be written ({error.strerror or error})") from error
     finally:
@@ -54,12 +54,14 @@ def check_writable(path: str) -> None:
     """Says early, before minutes of work, that an output cannot be written.
 
     Raises:
-        FileError: its folder is missing or read-only, or it is a folder.
+        FileError: its folder is missing or read-only, or it is a folder, a device or a pipe.
     """
-    folder = Path(path).parent
+    folder = Path(path).parent if not os.path.islink(path) else Path(os.path.realpath(path)).parent
     if not folder.is_dir():
         raise FileError(f"{path}: the folder {folder} does not exist; make it first")
     if Path(path).is_dir():
         raise FileError(f"{path}: this is a folder; name a file")
+    if os.path.exists(path) and not os.path.isfile(path):
+        raise FileError(f"{path}: this is a device or a pipe; name a file (- is stdout)")
     if not os.access(folder, os.W_OK):
         raise FileError(f"{path}: the folder {folder} is read-only")

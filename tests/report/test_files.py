@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where outputs go: never in the place of a device, and through links."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from fmqm_addon.metric.errors import FileError
+from fmqm_addon.report.files import check_writable, write_text
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
+def test_devices_and_pipes_are_left_alone(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(FileError, match="a device or a pipe"):
+        write_text(str(tmp_path / "pipe"), "text")
+    with pytest.raises(FileError, match="a device or a pipe"):
+        check_writable(os.devnull)
+    assert (tmp_path / "pipe").is_fifo()
+
+
+def test_a_link_stays_and_what_it_names_is_written(tmp_path: Path) -> None:
+    (tmp_path / "folder").mkdir()
+    for name in ("there", "new"):
+        (tmp_path / name).symlink_to(tmp_path / "folder" / name)
+    (tmp_path / "folder" / "there").write_text("older")
+    for name in ("there", "new"):
+        write_text(str(tmp_path / name), name)
+        assert (tmp_path / name).is_symlink() and (tmp_path / "folder" / name).read_text() == name
+    assert sorted(path.name for path in (tmp_path / "folder").iterdir()) == ["new", "there"]
+    (tmp_path / "lost").symlink_to(tmp_path / "nowhere" / "file")
+    with pytest.raises(FileError, match="does not exist"):
+        check_writable(str(tmp_path / "lost"))
