@@ -11,6 +11,7 @@ import argparse
 import json
 import math
 import sys
+import traceback
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -19,7 +20,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from fmqm_addon.batch.log import Log
-from fmqm_addon.blender.process import require_bpy, take_stdout
+from fmqm_addon.blender.process import require_bpy, stop_on_signals, take_stdout
 from fmqm_addon.metric.errors import FMQMError, SettingsError
 from fmqm_addon.metric.settings import PRESETS, Settings
 from scripts.score import FAILED, INTERRUPTED, OK, OneLineParser
@@ -221,10 +222,15 @@ def run() -> None:
     argv = sys.argv[1:]
     if Path(sys.argv[0]).name != Path(__file__).name:
         argv = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
+    stop_on_signals()
     try:
         code = main(argv, take_stdout())
     except KeyboardInterrupt:
         code = INTERRUPTED
+    except Exception:
+        # Blender would print it, go on and end with 0.
+        traceback.print_exc()
+        code = FAILED
     sys.exit(code)
 
 

@@ -14,6 +14,7 @@ import os
 import shutil
 import sys
 import tempfile
+import traceback
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -444,6 +445,10 @@ def run() -> None:
         code = main(argv, take_stdout())
     except KeyboardInterrupt:
         code = INTERRUPTED
+    except Exception:
+        # Blender would print it, go on and end with 0.
+        traceback.print_exc()
+        code = FAILED
     sys.exit(code)
 
 

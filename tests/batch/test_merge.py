@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import io
 import json
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -58,6 +60,19 @@ def test_limits_of_the_manifest_and_the_arguments_count(
     manifest = ("--manifest", write_manifest(tmp_path, f"reference,distorted,fail_under\n{rows}")) if rows else ()
     part = write_part(tmp_path, "a", fail_under=recorded)
     assert main(["--merge", part, *manifest, *limit], io.StringIO()) == code
+
+
+def test_the_unforeseen_ends_with_1() -> None:
+    """Under Blender too, which would go on after an exception that leaves the script."""
+    code = (
+        "import sys, scripts.score as script\n"
+        "def fail(*_):\n    raise RuntimeError('unforeseen')\n"
+        "script.main = fail\n"
+        "try:\n    script.run()\nexcept Exception:\n    pass\n"
+    )
+    root = Path(__file__).resolve().parents[2]
+    done = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True)
+    assert done.returncode == 1 and "RuntimeError: unforeseen" in done.stderr
 
 
 @pytest.mark.parametrize("flag", [("--jobs", "2"), ("--resume",), ("--both",), ("--picture", "p.png")])
