@@ -95,7 +95,7 @@ def save_version(spec: str, version: Version, path: str) -> None:
     for object_ in objects:
         add_modifiers(object_, version.ratio)
     if split_spec(spec)[1]:
-        _leave_only(objects[0])
+        _leave_only(objects[0], live=suffix == ".blend")
     target = Path(path)
     try:
         # Some formats are several files: all are written aside, then moved, the one that names the others last.
@@ -155,13 +155,62 @@ def _save_blend(path: str) -> None:
     bpy.ops.wm.save_as_mainfile(filepath=path, copy=True, relative_remap=False)
 
 
-def _leave_only(object_: bpy.types.Object) -> None:
-    """Every other object leaves the session; this one stays where it is."""
+def _leave_only(object_: bpy.types.Object, live: bool) -> None:
+    """Only this object stays in the session's scene, where it is; what its modifiers use stays in the session.
+
+    Collections are taken out whole, as its modifiers may use one of them.
+
+    Args:
+        live: its parent, constraints and armature still move it; exporters need them in the scene, or not at all.
+    """
+    scene = bpy.context.scene
+    if object_ not in scene.collection.objects[:]:
+        scene.collection.objects.link(object_)
+    for other_scene in list(bpy.data.scenes):
+        if other_scene != scene:
+            bpy.data.scenes.remove(other_scene)  # glTF has them all
     bpy.context.view_layer.update()
-    matrix = object_.matrix_world.copy()
-    for other in list(bpy.data.objects):
+    if live:
+        _keep_used(object_)
+    else:
+        _let_go(object_)
+    for other in list(scene.collection.objects):
         if other != object_:
-            bpy.data.objects.remove(other)
+            scene.collection.objects.unlink(other)
+    for collection in list(scene.collection.children):
+        scene.collection.children.unlink(collection)
+    bpy.context.view_layer.update()
+
+
+def _keep_used(object_: bpy.types.Object) -> None:
+    """Modifiers, constraints and drivers do not count as users of objects: files would be saved without these."""
+    users = bpy.data.user_map()
+    reached: set[bpy.types.ID] = {object_}
+    grown = True
+    while grown:
+        found = {block for block, by in users.items() if by & reached and not isinstance(block, bpy.types.Scene)}
+        grown = not found <= reached
+        reached |= found
+    for block in reached:
+        if isinstance(block, bpy.types.Object) and block.library is None:
+            block.use_fake_user = True
+
+
+def _let_go(object_: bpy.types.Object) -> None:
+    """What parent, constraints and armature make of an object becomes its own."""
+    matrix = object_.matrix_world.copy()
+    posed = object_.parent_type == "ARMATURE" or any(modifier.type == "ARMATURE" for modifier in object_.modifiers)
+    if posed and object_.type == "MESH":
+        # Exporters leave the deforming to a skeleton.
+        graph = bpy.context.evaluated_depsgraph_get()
+        mesh = bpy.data.meshes.new_from_object(
+            object_.evaluated_get(graph), preserve_all_data_layers=True, depsgraph=graph
+        )
+        object_.modifiers.clear()
+        object_.data = mesh
+    for constraint in list(object_.constraints):
+        object_.constraints.remove(constraint)
+    object_.parent = None
     object_.matrix_world = matrix
 
 

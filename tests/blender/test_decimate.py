@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+import numpy as np
 import pytest
 
 from fmqm_addon import ui
@@ -27,7 +28,7 @@ from fmqm_addon.blender.decimate import (
     scene_reader,
 )
 from fmqm_addon.blender.files import load_mesh
-from fmqm_addon.blender.reduced import EXPORTERS, save_version, texture_sizes
+from fmqm_addon.blender.reduced import EXPORTERS, file_reader, save_version, texture_sizes
 from fmqm_addon.metric.errors import FMQMError, MeshError
 from fmqm_addon.metric.score import Progress
 from fmqm_addon.metric.settings import Settings
@@ -149,6 +150,51 @@ def test_a_saved_version_is_what_was_measured(torus: Path, tmp_path: Path, kind:
         scenes.clear()
         bpy.ops.wm.open_mainfile(filepath=str(out))
         assert [modifier.name for modifier in bpy.data.objects["torus"].modifiers][-1] == DECIMATE, "live"
+
+
+@pytest.mark.parametrize("kind", [".glb", ".obj", ".fbx", ".usd", ".blend"])
+def test_a_saved_object_keeps_what_its_modifiers_use(tmp_path: Path, kind: str) -> None:
+    monkey = scenes.monkey("Rock")
+    parent, mirror = (bpy.data.objects.new(name, None) for name in ("Parent", "Mirror"))
+    parent.location, mirror.location = (0.5, 0, 0), (3, 0, 0)
+    for empty in (parent, mirror):
+        bpy.context.scene.collection.objects.link(empty)
+    monkey.parent = parent
+    monkey.constraints.new("COPY_ROTATION").target = mirror
+    monkey.modifiers.new("Mirror", "MIRROR").mirror_object = mirror
+    skeleton = bpy.data.objects.new("Skeleton", bpy.data.armatures.new("Skeleton"))
+    bpy.context.scene.collection.objects.link(skeleton)
+    bpy.context.view_layer.objects.active = skeleton
+    bpy.ops.object.mode_set(mode="EDIT")
+    skeleton.data.edit_bones.new("Bone").tail = (0, 0, 1)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    skeleton.pose.bones["Bone"].location = (0, 0.7, 0)
+    monkey.vertex_groups.new(name="Bone").add(range(100), 1.0, "REPLACE")
+    monkey.modifiers.new("Armature", "ARMATURE").object = skeleton
+    scenes.square("Other")
+    file, out = tmp_path / "rocks.blend", tmp_path / f"out{kind}"
+    bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    measured = file_reader(f"{file}:Rock")(Version(0.5))
+    save_version(f"{file}:Rock", Version(0.5), str(out))
+    written = load_mesh(str(out))
+    assert len(written.triangles) == len(measured.triangles) > 900, "mirrored, and nothing else"
+    for of in (np.min, np.max, np.mean):
+        ours, theirs = (of(arrays.positions[arrays.triangles].reshape(-1, 3), axis=0) for arrays in (measured, written))
+        assert np.abs(ours - theirs).max() < 1e-3, "placed and posed as it was measured"
+
+
+@pytest.mark.parametrize("kind", [".glb", ".blend"])
+def test_a_saved_object_keeps_a_collection_that_it_uses(tmp_path: Path, kind: str) -> None:
+    holes = bpy.data.collections.new("Holes")
+    bpy.context.scene.collection.children.link(holes)
+    scenes.cube("Hole", collection=holes).location = (1, 1, 1)
+    cutting = scenes.cube("Rock").modifiers.new("Boolean", "BOOLEAN")
+    cutting.operand_type, cutting.collection = "COLLECTION", holes
+    file, out = tmp_path / "rocks.blend", tmp_path / f"out{kind}"
+    bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    measured = file_reader(f"{file}:Rock")(Version())
+    save_version(f"{file}:Rock", Version(), str(out))
+    assert len(load_mesh(str(out)).triangles) == len(measured.triangles) > 12
 
 
 def test_script_decimates_to_a_target_and_says_how(torus: Path, tmp_path: Path) -> None:
