@@ -9,6 +9,7 @@ import bpy
 from bpy.props import BoolProperty, FloatProperty, IntProperty, StringProperty
 
 from ..blender.decimate import LEAST_TRIANGLES, Found, Reader, Reduced, Wish, decimated_copy, reducing, scene_reader
+from ..blender.snapshot import fingerprint, target_of
 from ..metric.errors import FMQMError
 from ..metric.score import Stepper, Work
 from ..metric.settings import Settings
@@ -50,6 +51,8 @@ class FMQM_OT_decimate(SteppedOperator, bpy.types.Operator):  # noqa: N801
     noun = "Decimation"
     stepper: Stepper[Reduced | FMQMError]
     _name: str
+    _scene: str
+    _mark: str
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -69,6 +72,8 @@ class FMQM_OT_decimate(SteppedOperator, bpy.types.Operator):  # noqa: N801
         except FMQMError as error:
             self.report({"ERROR"}, str(error))
             return False
+        context.view_layer.update()  # or a transform that is still to be applied would pass for a change
+        self._scene, self._mark = context.scene.name_full, fingerprint(target_of(context.active_object), False)
         self.stepper = Stepper(_attempt(scene_reader([self._name], self._name), wish, settings))
         return True
 
@@ -80,8 +85,13 @@ class FMQM_OT_decimate(SteppedOperator, bpy.types.Operator):  # noqa: N801
             return {"CANCELLED"}
         found = reduced.outcomes[0].last
         original = next((object_ for object_ in bpy.data.objects if object_.name_full == self._name), None)
-        if original is None:
-            self.report({"WARNING"}, f"{self._name} is gone, and what was found with it")
+        scene = next((scene for scene in bpy.data.scenes if scene.name_full == self._scene), None)
+        if original is None or scene is None:
+            gone = self._name if original is None else "The scene"
+            self.report({"WARNING"}, f"{gone} is gone, and what was found with it")
+            return {"CANCELLED"}
+        if fingerprint(target_of(original), False) != self._mark:
+            self.report({"WARNING"}, f"{self._name} was changed meanwhile; search again")
             return {"CANCELLED"}
         best = found.best
         if not found.reached:
@@ -92,11 +102,13 @@ class FMQM_OT_decimate(SteppedOperator, bpy.types.Operator):  # noqa: N801
             )
             return {"CANCELLED"}
         copy = decimated_copy(original, best.version.ratio, f"{original.name} FMQM {found.target:.2f}")
-        context.scene.fmqm.decimate.path = _path_text(found)
-        for object_ in context.selected_objects:
-            object_.select_set(False)
-        context.view_layer.objects.active = copy
-        copy.select_set(True)
+        scene.fmqm.decimate.path = _path_text(found)
+        context.view_layer.update()
+        if copy.name in context.view_layer.objects:  # not in another scene, or where its collection is excluded
+            for object_ in context.selected_objects:
+                object_.select_set(False)
+            context.view_layer.objects.active = copy
+            copy.select_set(True)
         self.report(
             {"INFO"}, f"{copy.name}: {best.triangles:,} of {reduced.triangles:,} triangles, FMQM {best.fmqm:.4f}"
         )

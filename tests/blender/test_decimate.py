@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +33,7 @@ from fmqm_addon.metric.errors import FMQMError, MeshError
 from fmqm_addon.metric.score import Progress
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.surface import finish
+from fmqm_addon.ui import decimate as ui_decimate
 
 from . import scenes
 from .script import SCORE, noise, read_json, score, strict_json, write_png, write_torus
@@ -280,6 +281,37 @@ def test_button_makes_a_copy_with_a_live_modifier() -> None:
     fmqm.decimate.limited, fmqm.decimate.max_triangles = True, 20
     before = scenes.blocks()
     assert bpy.ops.fmqm.decimate() == {"CANCELLED"} and scenes.blocks() == before, "missed: nothing is made"
+
+
+def during_the_search(monkeypatch: pytest.MonkeyPatch, change: Callable[[], object]) -> None:
+    """What the user does while the button works, just before it ends."""
+
+    def attempt(*arguments: Any) -> Any:
+        result = yield from searched(*arguments)
+        change()
+        return result
+
+    searched = ui_decimate._attempt
+    monkeypatch.setattr(ui_decimate, "_attempt", attempt)
+
+
+@pytest.mark.usefixtures("addon")
+def test_button_ends_in_another_scene(monkeypatch: pytest.MonkeyPatch) -> None:
+    rock, scene = scenes.monkey("Rock"), bpy.context.scene
+    scene.fmqm.settings.samples, scene.fmqm.settings.patches = 6400, 50
+    during_the_search(monkeypatch, lambda: setattr(bpy.context.window, "scene", bpy.data.scenes.new("Other")))
+    assert bpy.ops.fmqm.decimate() == {"FINISHED"}
+    assert {object_.name for object_ in scene.objects} == {"Rock", "Rock FMQM 0.90"} and not rock.modifiers
+    assert scene.fmqm.decimate.path and not bpy.data.scenes["Other"].fmqm.decimate.path
+
+
+@pytest.mark.usefixtures("addon")
+def test_button_notices_that_the_object_was_changed(monkeypatch: pytest.MonkeyPatch) -> None:
+    rock, fmqm = scenes.monkey("Rock"), bpy.context.scene.fmqm
+    fmqm.settings.samples, fmqm.settings.patches = 6400, 50
+    before = scenes.blocks()
+    during_the_search(monkeypatch, lambda: setattr(rock.data.vertices[0].co, "x", 3.0))
+    assert bpy.ops.fmqm.decimate() == {"CANCELLED"} and scenes.blocks() == before and not fmqm.decimate.path
 
 
 @pytest.mark.usefixtures("addon")
