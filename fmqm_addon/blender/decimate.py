@@ -133,6 +133,25 @@ class Search:
         # The modifier rounds down; half a triangle more keeps float32 from losing one.
         return Version(1.0 if count == self.triangles else (count + 0.5) / self.triangles)
 
+    def within(self, versions: Sequence[Version], max_triangles: int) -> Work[list[Version]]:
+        """Those of falling versions that keep to max_triangles: curves, texts and some meshes collapse less than asked.
+
+        Raises:
+            MeshError: none does.
+        """
+
+        def exceeds(index: int) -> Work[bool]:
+            yield Progress("Counting triangles", 0.0)
+            try:
+                return len(self._read(versions[index]).triangles) > max_triangles
+            except MeshError:
+                return False  # nothing is left of it
+
+        last = yield from last_passing(len(versions), exceeds, 0, 1)
+        if last == len(versions) - 1:
+            raise MeshError(f"it cannot be decimated to {max_triangles} triangles; allow more")
+        return list(versions[last + 1 :])
+
     def find(self, target: float, versions: Sequence[Version]) -> Work[Found]:
         """The last of versions, which get ever cheaper, that stays at or above the target; the next one does not.
 
@@ -249,7 +268,7 @@ class Reduced:
 
 
 def reducing(read: Reader, wish: Wish, settings: Settings) -> Stepper[Reduced]:
-    """Searches what is wished for; its steps raise what read, Measurement and Search.ratios raise."""
+    """Searches what is wished for; its steps raise what read, Measurement, Search.ratios and Search.within raise."""
     return Stepper(_reducing(read, wish, settings))
 
 
@@ -257,6 +276,8 @@ def _reducing(read: Reader, wish: Wish, settings: Settings) -> Work[Reduced]:
     search = Search(read, settings)
     yield from part(search.prepare(), 0.0, _PREPARED)
     ratios = search.ratios(wish.max_triangles)
+    if wish.max_triangles is not None:
+        ratios = yield from part(search.within(ratios, wish.max_triangles), _PREPARED, 0.0)
     parts = max(1, len(wish.targets)) * (1 + (wish.texture_target is not None))
     share = (1 - _PREPARED) / parts
     outcomes: list[Outcome] = []

@@ -103,6 +103,23 @@ def test_a_target_that_the_most_triangles_allowed_miss() -> None:
         reducing(scene_reader([monkey.name], "it"), Wish((0.99,), max_triangles=LEAST_TRIANGLES - 1), TINY).run()
 
 
+def test_what_cannot_be_decimated_counts_toward_the_most_triangles() -> None:
+    monkey = scenes.monkey()
+    bpy.ops.curve.primitive_bezier_circle_add(radius=2)
+    curve = bpy.context.object
+    curve.data.bevel_depth = 0.1
+    names = [monkey.name, curve.name]
+    whole = len(scene_reader(names, "it")(Version()).triangles)
+    fixed = whole - 968
+    reduced = reducing(scene_reader(names, "it"), Wish((0.01, 0.9999), fixed + 100), TINY).run()
+    for found in (outcome.last for outcome in reduced.outcomes):
+        assert all(step.triangles <= fixed + 100 for step in found.path)
+        assert found.best.triangles >= fixed
+    assert not reduced.outcomes[1].last.reached and reduced.outcomes[1].last.best.triangles > fixed + 80, "the dearest"
+    with pytest.raises(MeshError, match=f"it cannot be decimated to {fixed - 1} triangles; allow more"):
+        reducing(scene_reader(names, "it"), Wish((0.5,), fixed - 1), TINY).run()
+
+
 def test_searching_leaves_nothing_behind_even_when_it_is_cancelled_or_fails() -> None:
     monkey = scenes.monkey()
     before = scenes.blocks()
