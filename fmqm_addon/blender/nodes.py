@@ -41,7 +41,8 @@ class Place:
 def outputs(material: bpy.types.Material) -> list[Place]:
     """What feeds the active output: its surface and its displacement, where something does."""
     tree = material.node_tree
-    output = None if tree is None else tree.get_output_node("ALL")
+    # Cycles' own output first, as it bakes; asked for "ALL", Blender finds neither renderer's own.
+    output = None if tree is None else tree.get_output_node("CYCLES") or tree.get_output_node("EEVEE")
     if output is None:
         return []
     return [Place(output.inputs[name]) for name in ("Surface", "Displacement") if _link(output.inputs[name])]

@@ -140,6 +140,20 @@ def test_of_two_shaders_the_one_at_the_output_counts() -> None:
     assert color(material).rgb == pytest.approx((ENCODED[0.18],) * 3, abs=1e-5)
 
 
+@pytest.mark.parametrize("targets", [("EEVEE",), ("CYCLES",), ("EEVEE", "CYCLES")])
+def test_outputs_of_one_renderer_count_and_cycles_first(targets: tuple[str, ...]) -> None:
+    material = scenes.material()
+    tree = material.node_tree
+    tree.nodes.clear()
+    for target in targets:
+        shader, output = tree.nodes.new("ShaderNodeBsdfPrincipled"), tree.nodes.new("ShaderNodeOutputMaterial")
+        shader.inputs["Base Color"].default_value = (0.5 if target == targets[-1] else 0.18,) * 4
+        output.target = target
+        tree.links.new(shader.outputs["BSDF"], output.inputs["Surface"])
+    seen = look(material)
+    assert seen.material.color.rgb == pytest.approx((ENCODED[0.5],) * 3, abs=1e-5) and not seen.warnings
+
+
 @pytest.mark.parametrize("kind", ["TexChecker", "TexNoise", "Gamma", "ValToRGB", "HueSaturation", "NewGeometry"])
 def test_other_nodes_are_left_to_the_baker(kind: str) -> None:
     material = scenes.material()
