@@ -240,9 +240,9 @@ def _rows_by_slot(mesh: bpy.types.Mesh, cut: _Triangles) -> dict[int, _Rows]:
 
 
 def _slot_material(object_: bpy.types.Object, index: int) -> bpy.types.Material | None:
-    """Blender draws a face whose slot does not exist with the last slot there is."""
+    """Blender draws a face whose slot does not exist with the last slot there is, or with the first."""
     slots = object_.material_slots
-    return slots[min(index, len(slots) - 1)].material if len(slots) else None
+    return slots[min(max(index, 0), len(slots) - 1)].material if len(slots) else None
 
 
 def _read_slot(

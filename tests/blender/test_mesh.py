@@ -155,6 +155,13 @@ def test_face_beyond_the_last_slot_has_the_last() -> None:
     assert color.rgb == pytest.approx((0, 0, 1))
 
 
+def test_face_of_a_negative_slot_has_the_first() -> None:
+    object_ = scenes.square(materials=[scenes.material("First", (1, 0, 0)), scenes.material("Last", (0, 0, 1))])
+    object_.data.attributes.new("material_index", "INT", "FACE").data.foreach_set("value", [-5])
+    color = mesh_arrays([object_], "asset").materials[0].color
+    assert color.rgb == pytest.approx((1, 0, 0))
+
+
 @pytest.mark.parametrize("materials", [[], [None]], ids=["no slot", "empty slot"])
 def test_without_material_default_grey_and_a_warning(materials: list[None]) -> None:
     arrays = mesh_arrays([scenes.square("Bare", uv=False, materials=materials)], "asset")
