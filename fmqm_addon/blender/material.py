@@ -325,7 +325,8 @@ class _Reader:
         node, socket = place.node, place.socket
         if not socket.is_output or node.type in {"RGB", "VALUE"}:
             value = socket.default_value
-            rgb = (value,) * 3 if socket.type == "VALUE" else tuple(value)[:3]
+            # Vectors may have two dimensions.
+            rgb = (value,) * 3 if socket.type == "VALUE" else (*tuple(value)[:3], 0.0)[:3]
             return PlainLight((_finite(rgb[0]), _finite(rgb[1]), _finite(rgb[2])))
         if family(socket) == "VALUE":
             number = self._value(place)

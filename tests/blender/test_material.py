@@ -131,6 +131,18 @@ def test_no_shader_takes_the_viewport_color() -> None:
     assert seen.material.how == "plain" and len(seen.warnings) == 1 and "Toon" in seen.warnings[0]
 
 
+def test_vector_sockets_of_two_dimensions_have_no_third() -> None:
+    material = scenes.material()
+    group = bpy.data.node_groups.new("Group", "ShaderNodeTree")
+    group.interface.new_socket("Out", in_out="OUTPUT", socket_type="NodeSocketVector").dimensions = 2
+    output = group.nodes.new("NodeGroupOutput")
+    output.inputs[0].default_value = (0.5, 0.18)
+    node = material.node_tree.nodes.new("ShaderNodeGroup")
+    node.node_tree = group
+    material.node_tree.links.new(node.outputs[0], scenes.base_color(material))
+    assert color(material).rgb == pytest.approx((ENCODED[0.5], ENCODED[0.18], 0), abs=1e-5)
+
+
 def test_of_two_shaders_the_one_at_the_output_counts() -> None:
     material = scenes.material(color=(0.5, 0.5, 0.5))
     other = material.node_tree.nodes.new("ShaderNodeBsdfPrincipled")
