@@ -34,6 +34,7 @@ _POLL = 0.1  # seconds between looks at the workers
 _WORTHWHILE = 5.0  # seconds of work that a worker is started for, at least
 _BARREN = 3  # workers in a row that end before their first pair: it is not the pairs
 _GRACE = 30.0  # seconds after its time-out until a stuck worker ends itself, should nobody do it
+_LONGEST = 1e8  # seconds, three years; faulthandler takes no more than its clock can count
 
 
 @dataclass(frozen=True)
@@ -113,12 +114,11 @@ class _Pool:
             self._started += 1
             self.workers.append(_Worker(self._command, self._folder / f"shard-{self._started}.json", share))
         for worker in list(self.workers):
+            self._take_news(worker)  # first, since this process may have stood still for long, and the worker not
             trouble = worker.trouble(self._limits)
-            over = worker.ended or trouble != ""
-            if over:
+            if worker.ended or trouble:
                 worker.end()
-            self._take_news(worker)
-            if over:
+                self._take_news(worker)
                 self.workers.remove(worker)
                 self._bury(worker, trouble)
 
@@ -278,7 +278,7 @@ def end_with_parent() -> None:
 
 def end_when_stuck(timeout: float) -> None:
     """Lets this process end some time after the timeout, even where the parent is gone and no Python runs any more."""
-    faulthandler.dump_traceback_later(timeout + _GRACE, exit=True, file=2)
+    faulthandler.dump_traceback_later(min(timeout + _GRACE, _LONGEST), exit=True, file=2)
 
 
 def workers_command(script: str, arguments: Sequence[str]) -> list[str]:

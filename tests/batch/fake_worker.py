@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A worker that scores nothing but behaves as the names of its pairs say: die, die once, hang, swell, refuse."""
+"""A worker that scores nothing but behaves as the names of its pairs say: die, die once, nap, hang, swell, refuse."""
 
 from __future__ import annotations
 
@@ -29,6 +29,8 @@ for task in (task_of(plain) for plain in json.loads(shard.read_text(encoding="ut
     if name == "die" or (name == "die once" and not once.exists()):
         once.touch()
         os.kill(os.getpid(), signal.SIGKILL)
+    if name == "nap":
+        time.sleep(1)
     if name == "hang":
         time.sleep(60)
     if name == "swell":

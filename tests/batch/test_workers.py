@@ -89,6 +89,20 @@ def test_what_a_killed_run_has_left_is_not_the_new_runs(tmp_path: Path) -> None:
     assert finished(tmp_path) == Counter(["k0", "k1"]) and journal.record("k0")["FMQM"] == 0.5
 
 
+def test_a_watch_that_stood_still_does_not_take_the_workers_for_stuck(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As after SIGSTOP or a laptop's sleep: the pairs are done, but have not been read for longer than the time-out."""
+    monkeypatch.setattr(workers, "_POLL", 2.5)
+    watch(tmp_path, tasks_of("nap", "nap", "nap"), jobs=1, limits=Limits(timeout=2))
+    assert finished(tmp_path) == Counter(["k0", "k1", "k2"]) and len(list(tmp_path.glob("*.pid"))) == 1
+
+
+def test_any_timeout_can_be_counted() -> None:
+    workers.end_when_stuck(1e300)
+    workers.faulthandler.cancel_dump_traceback_later()
+
+
 def test_workers_that_never_begin_are_the_runs_error(tmp_path: Path) -> None:
     with pytest.raises(FMQMError, match="workers end before their first pair .no Blender here."):
         watch(tmp_path, tasks_of("fine", "fine"), told="refuse")
