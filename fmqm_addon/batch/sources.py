@@ -48,7 +48,11 @@ def glob_files(reference: str, pattern: str) -> list[str]:
         FileError: none does.
     """
     here = os.path.abspath(reference)
-    found = [path for path in sorted(glob.glob(pattern, recursive=True)) if os.path.abspath(path) != here]
+    found = [
+        path
+        for path in sorted(glob.glob(pattern, recursive=True))
+        if os.path.isfile(path) and os.path.abspath(path) != here
+    ]
     if not found:
         raise FileError(f"--glob {pattern}: no file matches; quote the pattern so that the shell leaves it alone")
     return found
@@ -89,7 +93,7 @@ def read_manifest(path: str, settings: Settings) -> list[Row]:
         plain = _csv_rows(path) if suffix == ".csv" else _json_rows(path)
     except OSError as error:
         raise FileError(f"{path}: cannot be read ({error.strerror})") from error
-    except (UnicodeDecodeError, csv.Error, json.JSONDecodeError, RecursionError) as error:
+    except (ValueError, csv.Error, RecursionError) as error:  # json raises ValueError for numbers too long for int
         raise FileError(f"{path}: not a {suffix[1:].upper()} file in UTF-8 ({error})") from error
     rows, taken = [], dict[str, int]()
     for number, values in plain:

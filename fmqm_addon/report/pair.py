@@ -161,8 +161,9 @@ def _cells(record: Mapping[str, Any], both: bool) -> tuple[str, ...]:
 
 def _csv_line(values: Iterable[str]) -> str:
     out = io.StringIO()
-    csv.writer(out, lineterminator="\n").writerow(values)
-    return out.getvalue()
+    # Before Python 3.13 only the characters of the line's ending are quoted, and readers end a line at either.
+    csv.writer(out, lineterminator="\r\n").writerow(values)
+    return out.getvalue().removesuffix("\r\n") + "\n"
 
 
 def _columns(values: Floats | None) -> dict[str, float | None]:

@@ -75,8 +75,9 @@ def test_a_wrong_manifest_is_one_line_that_names_file_and_row(tmp_path: Path, te
         ('[{"reference": "a", "distorted": "b", "seed": true}]', "row 1: seed is true; a whole number"),
         ('[{"reference": "a", "distorted": "b"}, {"distorted": "b"}]', "row 2: no reference"),
         ("[" * 100_000, "not a JSON file"),
+        ("[" + "7" * 5000 + "]", "not a JSON file"),
     ],
-    ids=range(7),
+    ids=range(8),
 )
 def test_a_wrong_json_manifest(tmp_path: Path, text: str, words: str) -> None:
     with pytest.raises(FMQMError, match=words):
@@ -106,6 +107,7 @@ def test_textures_are_none_one_or_each() -> None:
 def test_a_glob_is_sorted_and_leaves_the_reference_out(tmp_path: Path) -> None:
     for name in ("b.glb", "a.glb", "rock.glb", "c.png"):
         (tmp_path / name).touch()
+    (tmp_path / "folder.glb").mkdir()
     found = glob_files(str(tmp_path / "rock.glb"), str(tmp_path / "*.glb"))
     assert [Path(path).name for path in found] == ["a.glb", "b.glb"]
     with pytest.raises(FileError, match="no file matches"):
