@@ -59,6 +59,7 @@ from .nodes import (
     surface_of,
     upstream,
     upstream_outputs,
+    uses_nodes,
 )
 
 DEFAULT_GREY = 0.8  # linear base color that Blender gives a surface without a material
@@ -165,8 +166,8 @@ def _read_look(material: bpy.types.Material | None, cache: TextureCache, reading
         return Look(Material("", grey, how="none"), (), ("there is no material; Blender's default grey is taken",))
     surface = surface_of(material)
     if surface is None:
-        why = f"material {material.name} has no shader; its viewport color is taken"
-        return plain_look(material, why)
+        why = "has no shader" if uses_nodes(material) else "does not use nodes"
+        return plain_look(material, f"material {material.name} {why}; its viewport color is taken")
     reader = _Reader(material, surface, cache, reading)
     try:
         color, alpha = reader.look()

@@ -40,12 +40,17 @@ class Place:
 
 def outputs(material: bpy.types.Material) -> list[Place]:
     """What feeds the active output: its surface and its displacement, where something does."""
-    tree = material.node_tree
+    tree = material.node_tree if uses_nodes(material) else None
     # Cycles' own output first, as it bakes; asked for "ALL", Blender finds neither renderer's own.
     output = None if tree is None else tree.get_output_node("CYCLES") or tree.get_output_node("EEVEE")
     if output is None:
         return []
     return [Place(output.inputs[name]) for name in ("Surface", "Displacement") if _link(output.inputs[name])]
+
+
+def uses_nodes(material: bpy.types.Material) -> bool:
+    """Before Blender 5 a material may have nodes and not use them; later use_nodes has no effect, and warns."""
+    return material.node_tree is not None and (bpy.app.version >= (5, 0) or material.use_nodes)
 
 
 def surface_of(material: bpy.types.Material) -> Place | None:

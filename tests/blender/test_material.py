@@ -131,6 +131,16 @@ def test_no_shader_takes_the_viewport_color() -> None:
     assert seen.material.how == "plain" and len(seen.warnings) == 1 and "Toon" in seen.warnings[0]
 
 
+@pytest.mark.skipif(bpy.app.version >= (5, 0), reason="materials always use their nodes")
+def test_nodes_that_are_not_used_do_not_count() -> None:
+    material = scenes.material("Toon", (0.18, 0.18, 0.18))
+    material.use_nodes = False
+    material.diffuse_color = (0.5, 0.5, 0.5, 1.0)
+    seen = look(material)
+    assert seen.material.color.rgb == pytest.approx((ENCODED[0.5],) * 3, abs=1e-5)
+    assert seen.warnings == ("material Toon does not use nodes; its viewport color is taken",)
+
+
 def test_vector_sockets_of_two_dimensions_have_no_third() -> None:
     material = scenes.material()
     group = bpy.data.node_groups.new("Group", "ShaderNodeTree")
