@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..blender.process import stops_wait
-from ..metric.errors import FMQMError
+from ..metric.errors import FMQMError, OutputError
 from ..report.explain import explain, where
 from ..report.pair import PairScore, pair_record
 from ..report.pair_pictures import picture_stem, write_pair_pictures
@@ -107,6 +107,8 @@ class _Scorer:
                 if failure is not None:
                     raise failure
                 pair = self._compare(pair, task.row, reference, measurement)
+            except OutputError:
+                raise
             except FMQMError as error:
                 pair = replace(pair, error=str(error))
                 self._log.say(str(error))

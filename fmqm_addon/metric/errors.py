@@ -27,3 +27,7 @@ class MeshError(FMQMError):
 
 class FileError(FMQMError):
     """A file cannot be read or written."""
+
+
+class OutputError(FileError):
+    """An output cannot be written, which is no pair's fault: the run stops, and the pair is not taken as done."""

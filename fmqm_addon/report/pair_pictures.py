@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..metric.color import Texture
-from ..metric.errors import FileError
+from ..metric.errors import FileError, OutputError
 from ..metric.score import Result
 from ..metric.surface import Surface
 from .files import check_writable, replaced
@@ -86,7 +86,7 @@ def write_pair_pictures(
         What JSON can hold, for write_page: paths relative to the folder, with / in between, and what the captions say.
 
     Raises:
-        FileError: a picture cannot be written.
+        OutputError: a picture cannot be written.
     """
     aspect = natural_aspect(reference, distorted)
     width = round((VIEW_AREA / aspect) ** 0.5)
@@ -158,6 +158,9 @@ def _write(folder: str, stem: str, view: Pixels) -> str:
     from PIL import Image
 
     name = f"{PICTURES}/{stem}.jpg"
-    with replaced(os.path.join(folder, PICTURES, f"{stem}.jpg")) as temporary:
-        Image.fromarray(view).save(temporary, "JPEG", quality=JPEG_QUALITY, subsampling=0, optimize=True)
+    try:
+        with replaced(os.path.join(folder, PICTURES, f"{stem}.jpg")) as temporary:
+            Image.fromarray(view).save(temporary, "JPEG", quality=JPEG_QUALITY, subsampling=0, optimize=True)
+    except FileError as error:
+        raise OutputError(str(error)) from error
     return name
