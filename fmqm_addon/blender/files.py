@@ -143,7 +143,8 @@ _IMPORTERS: dict[str, Callable[[], bpy.types.Operator]] = {
 }
 # These importers do not mend meshes unless told to, and Blender would read beyond the ends of their arrays.
 _OPTIONS = dict.fromkeys((".usd", ".usda", ".usdc", ".usdz", ".abc"), {"validate_meshes": True})
-_CHECKS = {".abc": check_alembic, ".ply": check_ply, ".usd": check_usd, ".usda": check_usd}
+_CHECKS = {".abc": check_alembic, ".ply": check_ply}
+_CHECKS |= dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), check_usd)
 
 
 def _named(name: str, path: str) -> bpy.types.Object:

@@ -76,7 +76,8 @@ class TextureCache:
 
     def _shared(self, image: bpy.types.Image, limits: Limits) -> Pixels | None:
         """LODs mostly carry the reference's own images: decoding and keeping them again would cost twice."""
-        if image.source != "FILE" or image.is_dirty or not self._digest(image):
+        stale = image.has_data and image.packed_file is None  # what Blender holds may be older than the file
+        if image.source != "FILE" or image.is_dirty or stale or not self._digest(image):
             return read_pixels(image, limits)
         space, packed = image.colorspace_settings.name, image.packed_file is not None
         key = (self._digest(image), space, image.alpha_mode, packed)
@@ -209,7 +210,7 @@ def _tile_image(image: bpy.types.Image, number: int) -> Iterator[bpy.types.Image
         own = bpy.data.images.new("FMQM tile", 1, 1)
         own.pack(data=packed.data, data_len=len(packed.data))
         own.source = "FILE"
-    elif os.path.isfile(path):
+    elif os.path.isfile(path) and os.access(path, os.R_OK):
         own = bpy.data.images.load(path, check_existing=False)
     else:
         yield None
@@ -304,7 +305,10 @@ def image_digest(image: bpy.types.Image) -> str:
     """The same for the same content: of painted or generated images the pixels, else the file's bytes, of UDIM sets
     all tiles' files; "" where there is nothing."""
     digest = hashlib.blake2b(digest_size=16)
-    if image.source == "GENERATED" or image.is_dirty:
+    if image.source == "GENERATED" and not image.is_dirty:
+        kind = image.generated_type, image.generated_width, image.generated_height, image.use_generated_float
+        return hashlib.blake2b(repr((kind, tuple(image.generated_color))).encode(), digest_size=16).hexdigest()
+    if image.is_dirty:
         values: NDArray[np.float32] = np.empty(len(image.pixels), np.float32)
         image.pixels.foreach_get(values)
         digest.update(values.tobytes())

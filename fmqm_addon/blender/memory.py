@@ -14,7 +14,7 @@ from ..metric.settings import Settings
 from ..metric.surface import MeshArrays
 
 # Fitted to the peaks of score.py on pairs of 0.5 and 2 million triangles, with 2 and 4 values a corner.
-_BLENDER = 250e6  # bytes of an empty session with numpy
+_BLENDER = 320e6  # bytes of an empty session with numpy
 _PER_TRIANGLE = 175.0  # of either mesh: Blender's copy while it is read, arrays, tree
 _PER_CORNER_VALUE = 70.0  # a triangle's three corners, as read and as prepared
 _PER_SAMPLE = 300.0  # positions and both meshes' fields

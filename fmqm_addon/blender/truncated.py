@@ -7,13 +7,12 @@ import re
 from collections.abc import Iterator
 from typing import Literal
 
+import bpy
 import numpy as np
 
 from ..metric.errors import FileError
 
 _COUNT = re.compile(rb"-?0*\d{1,9}")  # Blender would end the process at 2^31
-_USD_COUNTS = re.compile(rb"faceVertexCounts\s*=\s*\[([-\d,\s]*)\]")
-_USD_INDICES = re.compile(rb"faceVertexIndices\s*=\s*\[([-\d,\s]*)\]")
 _PLY_BYTES = {
     **dict.fromkeys(("char", "uchar", "int8", "uint8"), 1),
     **dict.fromkeys(("short", "ushort", "int16", "uint16"), 2),
@@ -45,24 +44,31 @@ def check_alembic(path: str) -> None:
 
 
 def check_usd(path: str) -> None:
-    """In a USD file that is text, the faces of a mesh must have no more corners than it lists.
+    """The faces of a USD file's meshes must have no more corners than are listed: Blender 4.5 reads beyond the end.
 
     Raises:
         FileError: they have.
     """
-    with open(path, "rb") as file:
-        if file.read(5) != b"#usda":
-            return
-        text = file.read()
-    # A part is of one prim, up to the next.
-    for part in text.replace(b"over ", b"def ").replace(b"class ", b"def ").split(b"def "):
-        counts, indices = _USD_COUNTS.findall(part), _USD_INDICES.findall(part)
-        if len(counts) != 1 or len(indices) != 1:
+    try:
+        bpy.utils.expose_bundled_modules()
+        from pxr import Tf, Usd, UsdGeom
+    except ImportError:
+        return  # Debian's Blender 5 has no pxr, and survives such files
+    try:
+        stage = Usd.Stage.Open(path, Usd.Stage.LoadAll)
+    except Tf.ErrorException:
+        return  # the importer says what is wrong
+    for prim in stage.TraverseAll():
+        mesh = UsdGeom.Mesh(prim)
+        if not mesh:
             continue
-        corners = [int(count) for count in counts[0].replace(b",", b" ").split()]
-        listed = indices[0].count(b",") + 1 if indices[0].strip() else 0
-        if min(corners, default=0) < 0 or sum(corners) > listed:
-            raise FileError(f"{path}: a mesh's faces have {sum(corners)} corners, {listed} are listed; export it again")
+        faces, corners = mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr()
+        for time in {Usd.TimeCode.Default(), *map(Usd.TimeCode, {*faces.GetTimeSamples(), *corners.GetTimeSamples()})}:
+            counts, listed = np.array(faces.Get(time) or [], np.int64), len(corners.Get(time) or [])
+            if counts.min(initial=0) < 0 or counts.sum() > listed:
+                raise FileError(
+                    f"{path}: a mesh's faces have {counts.sum()} corners, {listed} are listed; export it again"
+                )
 
 
 def check_ply(path: str) -> None:

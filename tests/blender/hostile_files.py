@@ -456,9 +456,15 @@ USDA: dict[str, tuple[str, Outcome]] = {
     "count_huge": (usd(counts="2000000000"), "are listed"),
     "no_indices": (usd(indices=""), "are listed"),
     "second_mesh_beyond_indices": (
-        usd() + "\n" + MESH.format(counts="4", indices="0", points="", more=""),
+        usd() + "\n" + MESH.replace('"Mesh"', '"Second"').format(counts="4", indices="0", points="", more=""),
         "are listed",
     ),
+    "beyond_indices_at_a_time": (
+        usd().replace("faceVertexCounts = [3]", "faceVertexCounts.timeSamples = { 1: [3, 30000000] }"),
+        "are listed",
+    ),
+    "beyond_indices_with_a_comment": (usd(counts="# three\n3, 30000000"), "are listed"),
+    "count_not_a_number": (usd(counts="3-"), "Could not open USD"),
     "no_points": (usd(points=""), "no faces"),
     "nothing": ("#usda 1.0\n", "no mesh"),
     "nan_points": (usd(points="(0,0,0), (1,0,0), (nan,inf,0)"), "zero area"),
