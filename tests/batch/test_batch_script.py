@@ -70,6 +70,7 @@ def bytes_but_for_seconds(path: Path) -> str:
     return re.sub(r'("(?:load|prepare|fields|features|total)": |time=")[-+.e0-9]+', r"\1", text)
 
 
+@pytest.mark.once
 def test_200_pairs_five_hostile_killed_twice_and_resumed(assets: Path, tmp_path: Path) -> None:
     """As if nothing had happened: 195 scores, five errors, each once, the same bytes as an undisturbed run."""
     rows = [row | {"seed": seed, "id": f"{seed} {row['distorted']}"} for seed in range(10) for row in pairs_of(*SHAKEN)]

@@ -266,6 +266,7 @@ def test_script_says_what_is_wrong_in_one_line(
     assert (done.returncode, len(done.stderr.splitlines())) == (code, 1) and text in done.stderr, done.stderr
 
 
+@pytest.mark.once
 def test_real_models(shared_data: Path, tmp_path: Path) -> None:
     """The cat's glb splits its vertices at seams and names WebP textures."""
     model, out = shared_data / "egyptian_cat" / "egyptian_cat.glb", tmp_path / "cat.glb"

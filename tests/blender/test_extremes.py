@@ -127,6 +127,7 @@ def test_refused(shape: Shape, words: str) -> None:
     assert len(str(caught.value).splitlines()) == 1
 
 
+@pytest.mark.once
 def test_10000_loose_triangles_at_full_settings() -> None:
     """About 6 s on a free core. A patch of each takes in its neighbors by distance."""
     assert self_scores(build(loose(10_000, 0.01)), Settings()) == [1.0] * 5

@@ -267,6 +267,7 @@ def test_what_is_left_out_of_real_files_is_said(shared_data: Path) -> None:
             assert bool(told) == (name in TOLD) and TOLD.get(name, "") in told, f"{name}: {told}"
 
 
+@pytest.mark.once
 def test_real_files_in_a_process_each(shared_data: Path) -> None:
     """A line of the table or one line on stderr that names the file, and nothing else but warnings."""
 

@@ -13,7 +13,7 @@ import pytest
 from blender.script import SMALL, noise, score, write_png, write_torus
 from chromium import Page
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.once]
 
 PROGRAMS = ("chromium", "chromium-browser", "google-chrome")
 STRANGE = "<img src=x onerror=alert(1)>&'.obj"
