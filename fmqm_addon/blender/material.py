@@ -391,7 +391,8 @@ class _Reader:
                 continue
             if node.image is not None:
                 check_limits(node.image, self._reading.limits)
-            if role == "base color" and (node.image is None or not node.image.size[0]):
+            has_pixels = node.image is not None and (node.image.size[0] or node.image.type == "MULTILAYER")
+            if role == "base color" and not has_pixels:
                 self._missing(node)
 
     def _missing(self, node: bpy.types.Node) -> Light:
@@ -460,6 +461,8 @@ class _Reader:
 
     def _whole(self, node: bpy.types.Node, placement: Placement) -> Texture | None:
         pixels = self._cache.pixels(node.image, self._reading.limits)
+        if pixels is None and node.image.type == "MULTILAYER":  # Cycles reads its first layer, Python none
+            raise NotReadError(node, "has an image of several layers")
         return None if pixels is None else self._sampler(node, pixels, placement)
 
     def _sampler(self, node: bpy.types.Node, pixels: Pixels, placement: Placement) -> Texture:

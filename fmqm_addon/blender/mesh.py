@@ -25,6 +25,7 @@ from .images import TextureCache
 from .material import Layer, Look, Reading, Unread, plain_look, read_look
 
 AS_FOUND = Reading()  # with the images that the file names, baking what must be
+_WORKING_SPACE = "Linear Rec.709"  # what plain colors and color attributes are taken to be in
 _NAMED = 2  # of the objects that share a warning
 _CHANNELS = {"uv": 2, "color": 4}  # of a layer
 # What scans have: colors, and no material.
@@ -80,6 +81,9 @@ def mesh_arrays(
         (owner, f"{count} particle instances are left out; make them real to measure them")
         for owner, count in sorted(particles.items())
     ]
+    space = getattr(getattr(bpy.data, "colorspace", None), "working_space", _WORKING_SPACE)  # none before 5.0
+    if space != _WORKING_SPACE:
+        remarks.append((name, f"the file's working space is {space}; its colors are taken as {_WORKING_SPACE}"))
     joined = join_meshes([_placed(parts[place.shape], place.matrix) for place in places], one_line(name))
     return replace(joined, warnings=_told(remarks))
 

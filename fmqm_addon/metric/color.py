@@ -119,7 +119,12 @@ class Encoded:
     light: Light
 
     def lookup(self, values: Floats) -> Floats:
-        return encode_srgb(self.light.light_at(values))
+        return encode_srgb(_known(self.light.light_at(values)))
+
+
+def _known(numbers: Floats) -> Floats:
+    """Long chains of huge factors may overflow to what is no number; that is 0."""
+    return numbers if np.isfinite(numbers).all() else np.nan_to_num(numbers)
 
 
 @dataclass(frozen=True)
@@ -129,7 +134,7 @@ class Opacity:
     value: Value
 
     def opacity(self, values: Floats) -> Floats:
-        return np.clip(self.value.value_at(values), 0, 1)
+        return np.clip(_known(self.value.value_at(values)), 0, 1)
 
 
 @dataclass(frozen=True)

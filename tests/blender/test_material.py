@@ -399,3 +399,12 @@ def test_one_material_is_read_once(tmp_path: Path) -> None:
     first, second = (read_look(material, cache, Reading()) for material in materials)
     assert read_look(materials[0], cache, Reading()) is first
     assert first.material.color.pixels is second.material.color.pixels
+
+
+@pytest.mark.skipif(bpy.app.version < (5, 0), reason="before 5.0 every file works in one space")
+def test_another_working_space_is_a_warning() -> None:
+    object_ = scenes.square(materials=[scenes.material(color=(0.1, 0.8, 0.1))])
+    assert not mesh_arrays([object_], "asset").warnings
+    bpy.ops.wm.set_working_color_space(working_space="ACEScg")
+    (warning,) = mesh_arrays([object_], "asset").warnings
+    assert "working space is ACEScg" in warning

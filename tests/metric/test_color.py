@@ -299,3 +299,17 @@ def test_channels_are_the_saved_values() -> None:
 def test_channel_weights() -> None:
     assert channel_weights("lab").tolist() == [6, 1, 1]
     assert len(set(channel_weights("rgb").tolist())) == 1
+
+
+def test_what_overflows_is_a_color_all_the_same() -> None:
+    """Infinite times nothing is no number."""
+
+    class Endless:
+        def light_at(self, values: np.ndarray) -> np.ndarray:
+            return np.full((len(values), 3), [np.nan, np.inf, -np.inf])
+
+        def value_at(self, values: np.ndarray) -> np.ndarray:
+            return np.full(len(values), np.nan)
+
+    assert Encoded(Endless()).lookup(np.zeros((2, 0))) == pytest.approx(np.array([[0, 1, 0]] * 2))
+    assert Opacity(Endless()).opacity(np.zeros((2, 0))).tolist() == [0, 0]
