@@ -141,7 +141,7 @@ def test_workers_end_with_their_parent_and_what_they_did_is_kept(tmp_path: Path,
     parent = subprocess.Popen([sys.executable, "-c", PARENT, str(ROOT), str(tmp_path)])
     wait_for(lambda: len(alive(tmp_path)) == 2 and all(done_by(path) for path in tmp_path.glob("shard-*.json")))
     parent.send_signal(how)
-    assert parent.wait(10) == (130 if how == signal.SIGINT else -how)
+    assert parent.wait(60) == (130 if how == signal.SIGINT else -how)
     wait_for(lambda: not alive(tmp_path))
     journal = Journal(str(tmp_path / "journal"), resume=True)
     adopt(tmp_path, journal)
@@ -155,7 +155,7 @@ def done_by(shard: Path) -> bool:
 
 
 def wait_for(condition: object) -> None:
-    end = time.monotonic() + 10
+    end = time.monotonic() + 60  # machines are noisy, and every line is synced to disk
     while not condition():  # type: ignore[operator]
         assert time.monotonic() < end, "it does not come"
         time.sleep(0.05)
