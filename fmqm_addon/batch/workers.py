@@ -23,6 +23,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..blender.process import stops_wait
 from ..metric.errors import FMQMError
 from ..report.pair import PairScore, pair_record
 from .journal import Journal, parse_line
@@ -73,7 +74,8 @@ def score_with_workers(
     pool = _Pool(tasks, command, folder, limits, journal, log)
     try:
         while pool.waiting or pool.workers:
-            pool.look_after(jobs)
+            with stops_wait():  # a stop inside of Popen.poll would leave its lock closed, and Popen.wait waiting
+                pool.look_after(jobs)
             time.sleep(_POLL)
     finally:
         pool.stop()

@@ -58,7 +58,9 @@ def stop_on_signals() -> None:
 
 @contextlib.contextmanager
 def stops_wait() -> Iterator[None]:
-    """Holds a stop back while Blender opens a file, since the Python that it runs then swallows it; not a second one.
+    """Holds a stop back where it would be lost or do harm: Python that Blender runs while it opens a file swallows it.
+
+    A second stop is not held back.
 
     Raises:
         KeyboardInterrupt: at the end, if there was one.

@@ -124,11 +124,12 @@ def test_memory_is_told_by_proc_and_by_ps(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 PARENT = """
-import signal, sys
+import sys
 from pathlib import Path
-signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
 sys.path.insert(0, sys.argv[1])
+from fmqm_addon.blender.process import stop_on_signals
 from tests.batch.test_workers import tasks_of, watch
+stop_on_signals()  # as score.py
 try:
     watch(Path(sys.argv[2]), tasks_of("fine", "hang", "fine", "hang"))
 except KeyboardInterrupt:
