@@ -62,7 +62,8 @@ def write_page(
 def page_parts(records: Iterable[Record], settings: Mapping[str, Any], versions: Mapping[str, str]) -> Iterator[str]:
     """The text of the page; the arguments are those of write_page."""
     beside = Path(__file__).parent
-    overview = _overview(records)
+    folder = _folder_to_leave_out(records)
+    overview = _overview(records, folder)
     yield f"""<!DOCTYPE html>
 <html lang="en">
 <head>
@@ -83,14 +84,14 @@ def page_parts(records: Iterable[Record], settings: Mapping[str, Any], versions:
 {_TABLE}
 """
     for number, record in enumerate(records, 1):
-        yield _row(number, record)
+        yield _row(number, record, folder)
     yield "</tbody></table></section>\n"
     reference = None
     for number, record in enumerate(records, 1):
         if record["reference"] != reference:
             reference = record["reference"]
             yield f"<h2>{_text(reference)}</h2>\n{_curves(reference, overview.chains.pop(reference, []))}"
-        yield _pair(number, record)
+        yield _pair(number, record, folder)
     yield f"""{_settings(settings, versions)}
 </main>
 <script>
@@ -124,12 +125,12 @@ class _Overview:
     chains: dict[str, list[_Cost]] = field(default_factory=dict)
 
 
-def _overview(records: Iterable[Record]) -> _Overview:
+def _overview(records: Iterable[Record], folder: str | None) -> _Overview:
     all_pairs = _Overview()
     for record in records:
         chain = all_pairs.chains.setdefault(record["reference"], [])
         all_pairs.pairs += 1
-        score, name = record["FMQM"], _name(record)
+        score, name = record["FMQM"], _name(record, folder)
         if score is None:
             continue
         all_pairs.scored += 1
@@ -152,14 +153,14 @@ def _summary(overview: _Overview) -> str:
     return said + " 1 is the same as the reference; compare scores only at equal settings."
 
 
-def _row(number: int, record: Record) -> str:
+def _row(number: int, record: Record, folder: str | None) -> str:
     note = f'<span class="faint">of {_text(_base_name(record["reference"]))}</span>'
     if record["error"]:
         note = '<span class="bad">not scored</span>'
     elif below(record):
         note = f'<span class="bad">below {record["fail_under"]:g}</span>'
-    name = escape(_name(record))
-    cells = [f'<th scope="row" data-value="{name}"><a href="#pair-{number}">{_text(_name(record))}</a><br>{note}</th>']
+    name = _name(record, folder)
+    cells = [f'<th scope="row" data-value="{escape(name)}"><a href="#pair-{number}">{_text(name)}</a><br>{note}</th>']
     cells += [_cell(record[column], _score(record, column) + _bar(record[column])) for column in SHOWN]
     pictures = record.get("pictures")
     triangles, size = (pictures["triangles"][1], pictures["texture_bytes"][1]) if pictures else (None, None)
@@ -213,8 +214,8 @@ def _curve(reference: str, chain: Sequence[_Cost], costs: Sequence[tuple[float, 
     return f"<div><h4>FMQM against {of}</h4>{drawn}</div>"
 
 
-def _pair(number: int, record: Record) -> str:
-    name, path = _name(record), record["distorted"]
+def _pair(number: int, record: Record, folder: str | None) -> str:
+    name, path = _name(record, folder), record["distorted"]
     whole_path = "" if name == path else f'<p class="faint">{_text(path)}</p>'
     parts = [
         f'<div class="title"><div><h3>{_text(name)}</h3>{whole_path}</div>'
@@ -230,7 +231,7 @@ def _pair(number: int, record: Record) -> str:
         parts.append(f'<ul class="warnings" aria-label="Warnings">{items}</ul>')
     pictures = record.get("pictures")
     if pictures:
-        parts.append(_views(record, pictures))
+        parts.append(_views(name, pictures))
     if record["FMQM"] is not None:
         features = "".join(
             f'<dt>{name}</dt><dd>{_bar(record[name])}</dd><dd class="number">{_score(record, name)}</dd>'
@@ -257,7 +258,7 @@ def _attribution(attribution: Record | None) -> str:
     )
 
 
-def _views(record: Record, pictures: Record) -> str:
+def _views(name: str, pictures: Record) -> str:
     """The three pictures on one camera; the worst patches that can be seen there are marked on the last."""
     marks = "".join(
         f'<span class="mark" style="left:{100 * worst["at"][0]:.1f}%;top:{100 * worst["at"][1]:.1f}%">{rank}</span>'
@@ -269,7 +270,6 @@ def _views(record: Record, pictures: Record) -> str:
         for triangles, size in zip(pictures["triangles"], pictures["texture_bytes"], strict=True)
     ]
     size = tuple(pictures["size"])
-    name = _name(record)
     figures = (
         (_image(pictures["reference"], f"Reference of {name}", size), "Reference", costs[0]),
         (_image(pictures["distorted"], f"Distorted: {name}", size), "Distorted", costs[1]),
@@ -350,9 +350,30 @@ def _settings(settings: Mapping[str, Any], versions: Mapping[str, str]) -> str:
     )
 
 
-def _name(record: Record) -> str:
-    """Short: the pair's id, or where that is the path of what was scored, the last part of it."""
-    return _base_name(record["distorted"]) if record["id"] == record["distorted"] else str(record["id"])
+def _folder_to_leave_out(records: Iterable[Record]) -> str | None:
+    """Of the names that are paths, where their last parts do not tell them apart: the folder that all are in."""
+    names: set[str] = set()
+    folder = None
+    alike = False
+    for path in (record["distorted"] for record in records if record["id"] == record["distorted"]):
+        name, where = _base_name(path), os.path.dirname(path)
+        alike = alike or name in names
+        names.add(name)
+        try:
+            folder = where if folder is None else os.path.commonpath([folder, where])
+        except ValueError:  # relative and absolute ones, or two drives
+            folder = ""
+    return folder if alike else None
+
+
+def _name(record: Record, folder: str | None) -> str:
+    """Short: the pair's id, or where that is the path of what was scored, the last parts of it."""
+    path = str(record["distorted"])
+    if record["id"] != path:
+        return str(record["id"])
+    if folder is None:
+        return _base_name(path)
+    return os.path.relpath(path, folder) if folder else path
 
 
 def _base_name(path: str) -> str:

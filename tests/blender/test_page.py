@@ -206,6 +206,19 @@ def test_names_from_strangers_stay_text() -> None:
     assert "<script>alert" not in shown.html
 
 
+def test_pairs_are_told_apart_by_their_names() -> None:
+    """By the last parts of their paths, as few as it takes."""
+
+    def names(*paths: str) -> list[str | None]:
+        page = Page(*map(record, paths))
+        return [attributes["data-value"] for tag, attributes in page.tags if tag == "th" and "data-value" in attributes]
+
+    assert names("../lods/two//mesh.obj", "../lods/rock.obj") == ["mesh.obj", "rock.obj"]
+    paths = ("../lods/one/mesh.obj", "../lods/two//mesh.obj", "../lods/rock.obj")
+    assert names(*paths) == ["one/mesh.obj", "two/mesh.obj", "rock.obj"]
+    assert names("/a/mesh.obj", "b/mesh.obj") == ["/a/mesh.obj", "b/mesh.obj"]
+
+
 def test_every_pair_is_on_the_page() -> None:
     page = Page(record("good.glb", 0.875), record("bad.glb", None, error="bad.glb: is broken; repair it"))
     assert "2 pairs, 1 reference. Lowest FMQM: 0.8750, good.glb. 1 not scored." in page.text
