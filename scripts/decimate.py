@@ -11,7 +11,6 @@ import argparse
 import json
 import math
 import sys
-import traceback
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -20,10 +19,10 @@ from typing import TYPE_CHECKING, Any, TextIO
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from fmqm_addon.batch.log import Log
-from fmqm_addon.blender.process import require_bpy, stop_on_signals, take_stdout
+from fmqm_addon.blender.process import FAILED, OK, require_bpy, run_script
 from fmqm_addon.metric.errors import FMQMError, SettingsError
 from fmqm_addon.metric.settings import PRESETS, Settings
-from scripts.score import FAILED, INTERRUPTED, OK, OneLineParser
+from scripts.score import OneLineParser
 
 PROGRAM = "decimate.py"
 
@@ -217,22 +216,5 @@ def _step_dict(step: Step) -> dict[str, Any]:
     return {**asdict(step.version), "triangles": step.triangles, "FMQM": step.fmqm, "fast": step.quick}
 
 
-def run() -> None:
-    """Arguments to exit code; under Blender, whose name argv[0] is then, the arguments follow --."""
-    argv = sys.argv[1:]
-    if Path(sys.argv[0]).name != Path(__file__).name:
-        argv = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
-    stop_on_signals()
-    try:
-        code = main(argv, take_stdout())
-    except KeyboardInterrupt:
-        code = INTERRUPTED
-    except Exception:
-        # Blender would print it, go on and end with 0.
-        traceback.print_exc()
-        code = FAILED
-    sys.exit(code)
-
-
 if __name__ == "__main__":
-    run()
+    run_script(main, __file__)

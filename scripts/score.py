@@ -14,7 +14,6 @@ import os
 import shutil
 import sys
 import tempfile
-import traceback
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -31,7 +30,7 @@ from fmqm_addon.batch.rows import Options, Row, Task
 from fmqm_addon.batch.run import score_tasks, units_of, work_off
 from fmqm_addon.batch.sources import glob_files, lod_rows, plain_rows, read_manifest
 from fmqm_addon.batch.workers import Limits, adopt, score_with_workers, workers_command
-from fmqm_addon.blender.process import blender_version, require_bpy, stop_on_signals, take_stdout
+from fmqm_addon.blender.process import FAILED, OK, WRONG_ARGUMENTS, blender_version, require_bpy, run_script
 from fmqm_addon.blender.space import SPACES
 from fmqm_addon.metric.errors import FMQMError, SettingsError, one_line
 from fmqm_addon.metric.settings import CENTERS, COLOR_SPACES, POOLINGS, PRESETS, SETTING_NAMES, Settings
@@ -46,7 +45,6 @@ if TYPE_CHECKING:
     from fmqm_addon.batch.run import Scored
 
 MAX_BAKE = 16384  # pixels a side
-OK, FAILED, WRONG_ARGUMENTS, INTERRUPTED = 0, 1, 2, 130
 PROGRAM = "score.py"
 
 
@@ -435,22 +433,5 @@ def _exit_code(records: Iterable[Mapping[str, Any]]) -> int:
     return FAILED if any(record["error"] is not None or below(record) for record in records) else OK
 
 
-def run() -> None:
-    """Arguments to exit code; under Blender, whose name argv[0] is then, the arguments follow --."""
-    argv = sys.argv[1:]
-    if Path(sys.argv[0]).name != Path(__file__).name:
-        argv = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
-    stop_on_signals()
-    try:
-        code = main(argv, take_stdout())
-    except KeyboardInterrupt:
-        code = INTERRUPTED
-    except Exception:
-        # Blender would print it, go on and end with 0.
-        traceback.print_exc()
-        code = FAILED
-    sys.exit(code)
-
-
 if __name__ == "__main__":
-    run()
+    run_script(main, __file__)

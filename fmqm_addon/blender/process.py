@@ -9,12 +9,14 @@ import importlib.metadata
 import os
 import signal
 import sys
-from collections.abc import Iterator
+import traceback
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TextIO
+from typing import NoReturn, TextIO
 
 from ..metric.errors import FMQMError
 
+OK, FAILED, WRONG_ARGUMENTS, INTERRUPTED = 0, 1, 2, 130  # exit codes
 SYSTEM_PACKAGES = "libx11-6 libxrender1 libxxf86vm1 libxfixes3 libxi6 libxkbcommon0 libsm6 libice6 libgl1 libegl1"
 
 
@@ -90,6 +92,26 @@ def _stop(number: int, frame: object) -> None:
     _stops.came = True
     if not waits:
         raise KeyboardInterrupt
+
+
+def run_script(main: Callable[[Sequence[str], TextIO], int], script: str) -> NoReturn:
+    """Ends the process with the exit code of main, which gets arguments and standard output.
+
+    Args:
+        script: its __file__. Under Blender, whose name argv[0] is then, the arguments follow --.
+    """
+    argv = sys.argv[1:]
+    if os.path.basename(sys.argv[0]) != os.path.basename(script):
+        argv = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
+    stop_on_signals()
+    try:
+        code = main(argv, take_stdout())
+    except KeyboardInterrupt:
+        code = INTERRUPTED
+    except Exception:
+        traceback.print_exc()  # Blender would do the same, go on and end with 0
+        code = FAILED
+    sys.exit(code)
 
 
 def take_stdout() -> TextIO:
