@@ -15,7 +15,7 @@ from typing import TypeAlias
 import bpy
 
 from .blender.job import Outcome, measuring
-from .blender.material import Reading
+from .blender.looks import Reading
 from .blender.mesh import AS_FOUND
 from .blender.snapshot import target_of
 from .metric.score import COLUMNS, Result

@@ -21,7 +21,7 @@ from .rows import Options, Row, Task, grouped, task_of
 from .workers import end_when_stuck, end_with_parent, journal_of
 
 if TYPE_CHECKING:
-    from ..blender.material import Reading
+    from ..blender.looks import Reading
     from ..blender.measure import Comparison, Measurement
     from ..blender.space import Placed
     from ..metric.score import Result, Stepper
@@ -210,7 +210,7 @@ class _Scorer:
 def _reading(options: Options) -> Reading:
     """How all assets of a run are read, textures of their own aside."""
     from ..blender.headers import DEFAULT_LIMITS, Limits
-    from ..blender.material import Reading
+    from ..blender.looks import Reading
 
     limits = Limits(options.max_image_side or DEFAULT_LIMITS.side, options.max_image_bytes or DEFAULT_LIMITS.decoded)
     reading = Reading(limits=limits)

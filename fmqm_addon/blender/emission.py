@@ -8,7 +8,7 @@ from enum import Enum
 
 import bpy
 
-from .nodes import only_shines
+from .nodes import active_output, only_shines
 
 # Mixing never hides one of its shaders wholly: what a transparent one covers still has a color.
 _LEAST_SHARE = 1e-4
@@ -46,7 +46,7 @@ def shining(material: bpy.types.Material, shine: Shine, temporary: ExitStack) ->
     copy = material.copy()
     temporary.callback(bpy.data.materials.remove, copy)
     tree = copy.node_tree
-    output = tree.get_output_node("CYCLES") or tree.get_output_node("EEVEE")
+    output = active_output(tree)
     if output is not None:
         output.target = "ALL"
         for name in ("Volume", "Displacement"):

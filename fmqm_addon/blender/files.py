@@ -17,7 +17,7 @@ from ..metric.surface import MeshArrays
 from .assets import check_object, scene_members
 from .images import TextureCache
 from .lods import find_chains
-from .material import Reading
+from .looks import Reading
 from .mesh import AS_FOUND, to_bake
 from .remarks import left_out
 from .snapshot import placed

@@ -15,7 +15,7 @@ from ..metric.surface import Surface
 from ..metric.trust import Trust
 from .attribution import Attribution, attribute
 from .images import TextureCache
-from .material import Reading
+from .looks import Reading
 from .measure import Comparison, Measurement
 from .mesh import AS_FOUND
 from .snapshot import Target, bakes, fingerprint, take

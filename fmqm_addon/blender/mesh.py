@@ -22,12 +22,12 @@ from .assets import disabled_when_instanced, instanced
 from .bake import Baked, bake_slots
 from .evaluate import Evaluated, Shown, evaluated, shown
 from .images import TextureCache
-from .material import Layer, Look, Reading, Unread, plain_look, read_look
+from .looks import Layer, Look, Reading, Unread
+from .material import plain_look, read_look
 
 AS_FOUND = Reading()  # with the images that the file names, baking what must be
 _WORKING_SPACE = "Linear Rec.709"  # what plain colors and color attributes are taken to be in
 _NAMED = 2  # of the objects that share a warning
-_CHANNELS = {"uv": 2, "color": 4}  # of a layer
 # What scans have: colors, and no material.
 _VERTEX_COLORS = Look(Material("", Encoded(VertexColor(0)), how="none"), (Layer("color", ""),))
 
@@ -270,7 +270,7 @@ def _read_slot(
         found = _layer_values(mesh, layer, cut, rows)
         if found is None:
             missing.append(_missing(layer, material))
-            found = np.zeros((len(values[0]), 3, _CHANNELS[layer.kind]), np.float32)
+            found = np.zeros((len(values[0]), 3, layer.width), np.float32)
         values.append(found)
     corners = values[-1] if len(values) <= 2 else np.concatenate(values, axis=2)
     return _Slot(material, look, rows, corners, tuple(missing))

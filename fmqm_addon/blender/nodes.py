@@ -40,12 +40,15 @@ class Place:
 
 def outputs(material: bpy.types.Material) -> list[Place]:
     """What feeds the active output: its surface and its displacement, where something does."""
-    tree = material.node_tree if uses_nodes(material) else None
-    # Cycles' own output first, as it bakes; asked for "ALL", Blender finds neither renderer's own.
-    output = None if tree is None else tree.get_output_node("CYCLES") or tree.get_output_node("EEVEE")
+    output = active_output(material.node_tree) if uses_nodes(material) else None
     if output is None:
         return []
     return [Place(output.inputs[name]) for name in ("Surface", "Displacement") if _link(output.inputs[name])]
+
+
+def active_output(tree: bpy.types.NodeTree) -> bpy.types.Node | None:
+    """Cycles' own output first, as it bakes; asked for "ALL", Blender finds neither renderer's own."""
+    return tree.get_output_node("CYCLES") or tree.get_output_node("EEVEE")
 
 
 def uses_nodes(material: bpy.types.Material) -> bool:

@@ -17,7 +17,7 @@ from ..metric.spatial import Floats
 from .assets import SURFACE_TYPES, check_object, collection_members, family_members, instanced, is_measured
 from .evaluate import evaluated
 from .images import TextureCache
-from .material import Reading
+from .looks import Reading
 from .mesh import AS_FOUND, mesh_arrays, to_bake
 from .space import Placed
 

@@ -65,10 +65,9 @@ def test_limits_of_the_manifest_and_the_arguments_count(
 def test_the_unforeseen_ends_with_1() -> None:
     """Under Blender too, which would go on after an exception that leaves the script."""
     code = (
-        "import sys, scripts.score as script\n"
+        "from fmqm_addon.blender.process import run_script\n"
         "def fail(*_):\n    raise RuntimeError('unforeseen')\n"
-        "script.main = fail\n"
-        "try:\n    script.run()\nexcept Exception:\n    pass\n"
+        "try:\n    run_script(fail, __name__)\nexcept Exception:\n    pass\n"
     )
     root = Path(__file__).resolve().parents[2]
     done = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True)

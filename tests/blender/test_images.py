@@ -21,7 +21,8 @@ from fmqm_addon.blender.images import (
     tile_path,
     tile_place,
 )
-from fmqm_addon.blender.material import Reading, read_look
+from fmqm_addon.blender.looks import Reading
+from fmqm_addon.blender.material import read_look
 from fmqm_addon.blender.mesh import mesh_arrays
 from fmqm_addon.metric.errors import FileError, MeshError
 from fmqm_addon.metric.surface import prepare_surface

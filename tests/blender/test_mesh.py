@@ -14,7 +14,7 @@ from mathutils import Matrix
 
 from fmqm_addon.blender.bvh import BVHQuery
 from fmqm_addon.blender.images import TextureCache
-from fmqm_addon.blender.material import Reading
+from fmqm_addon.blender.looks import Reading
 from fmqm_addon.blender.mesh import mesh_arrays, to_bake
 from fmqm_addon.metric.color import Texture
 from fmqm_addon.metric.errors import MeshError

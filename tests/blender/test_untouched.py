@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fmqm_addon.blender.job import measuring
-from fmqm_addon.blender.material import Reading
+from fmqm_addon.blender.looks import Reading
 from fmqm_addon.blender.snapshot import target_of
 from fmqm_addon.metric.settings import Settings
 

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What reading a material is asked for, and what comes of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from ..metric.color import ImageFacts, Material, Texture
+from .headers import DEFAULT_LIMITS, Limits
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How an asset's looks are read.
+
+    Attributes:
+        texture: replaces everything that the materials say.
+        bake: side of baked images in pixels; 0 forbids baking.
+        stand_in: a missing base-color image is shown in magenta, as Blender shows it, instead of being an error.
+        limits: of the images.
+    """
+
+    texture: Texture | None = None
+    bake: int = 1024
+    stand_in: bool = False
+    limits: Limits = DEFAULT_LIMITS
+
+
+@dataclass(frozen=True)
+class Layer:
+    """What a material wants of a mesh: a UV map (2 channels of MeshArrays.corners) or a color attribute (4, linear
+    RGBA). The name "" is the mesh's one that is active for rendering."""
+
+    kind: Literal["uv", "color"]
+    name: str
+
+    @property
+    def width(self) -> int:
+        """How many channels it has."""
+        return {"uv": 2, "color": 4}[self.kind]
+
+
+@dataclass(frozen=True)
+class Look:
+    """A material that was read.
+
+    Attributes:
+        material: its samplers read the channels of MeshArrays.corners, layer after layer in the order of layers.
+        layers: what the mesh must offer.
+        warnings: what was assumed; they name the material.
+    """
+
+    material: Material
+    layers: tuple[Layer, ...]
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Unread:
+    """A material that must be baked: the node that is not read, what about it (a verb phrase), the images that are
+    used, and what was assumed of them."""
+
+    node: str
+    why: str
+    images: tuple[ImageFacts, ...] = ()
+    warnings: tuple[str, ...] = ()

@@ -1,0 +1,489 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The nodes of a material, as far as assets are really made of them, as samplers that numpy evaluates.
+
+Nothing here guesses: what is read is what Cycles shows, which the tests hold against its baker.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+
+import bpy
+import numpy as np
+from mathutils import Euler, Matrix
+
+from ..metric.color import (
+    MISSING,
+    Alpha,
+    Arithmetic,
+    Color,
+    Constant,
+    Encoded,
+    Extension,
+    Floats,
+    Fold,
+    Grey,
+    ImageAlpha,
+    Interpolation,
+    Light,
+    Mix,
+    Opacity,
+    Operation,
+    Placement,
+    PlainColor,
+    PlainLight,
+    Scaled,
+    Texture,
+    Tiles,
+    Value,
+    VertexColor,
+    Weighted,
+    encode_srgb,
+)
+from ..metric.errors import MeshError
+from .images import BRIGHTEST, LINEAR_SPACES, Pixels, TextureCache, check_limits, tile_path, tile_place, why_unread
+from .looks import Layer, Reading
+from .nodes import NotReadError, Place, by_identifier, family, only_shines, outputs, source, upstream, upstream_outputs
+
+MOST_NODES = 200  # of what feeds a base color; read trees are evaluated recursively
+_EXTENSIONS: dict[str, Extension] = {"REPEAT": "repeat", "EXTEND": "extend", "CLIP": "clip", "MIRROR": "mirror"}
+_INTERPOLATIONS: dict[str, Interpolation] = {
+    "Linear": "linear",
+    "Closest": "closest",
+    "Cubic": "cubic",
+    "Smart": "cubic",  # to Cycles they are the same
+}
+_OPERATIONS: dict[str, Operation] = {
+    "ADD": "add",
+    "SUBTRACT": "subtract",
+    "MULTIPLY": "multiply",
+    "LESS_THAN": "less",
+    "GREATER_THAN": "greater",
+    "ROUND": "round",
+    "MINIMUM": "minimum",
+    "MAXIMUM": "maximum",
+}
+_LUMINANCE = (0.2126729, 0.7151522, 0.0721750)  # a color where a number is wanted
+_AVERAGE = (1 / 3, 1 / 3, 1 / 3)  # a vector where a number is wanted
+_CHANNELS = {"Red": (1.0, 0.0, 0.0), "Green": (0.0, 1.0, 0.0), "Blue": (0.0, 0.0, 1.0)} | {
+    "X": (1.0, 0.0, 0.0),
+    "Y": (0.0, 1.0, 0.0),
+    "Z": (0.0, 0.0, 1.0),
+}
+FIRST_ROLES = ("base color", "alpha")  # of the images, before all others
+
+
+def plain_color(linear: tuple[float, ...]) -> PlainColor:
+    red, green, blue = encode_srgb(np.array([_finite(x) for x in linear])).tolist()
+    return PlainColor((red, green, blue))
+
+
+def _finite(number: float) -> float:
+    """Sockets take any float; what is made of them must stay finite."""
+    return min(max(number, -BRIGHTEST), BRIGHTEST) if isfinite(number) else 0.0
+
+
+@dataclass(frozen=True)
+class _Transparent:
+    """What a Transparent BSDF is to the shaders that it is mixed with: nothing."""
+
+
+class Reader:
+    """Reads one material; collects on the way what it wants of the mesh and what was assumed."""
+
+    def __init__(self, material: bpy.types.Material, surface: Place, cache: TextureCache, reading: Reading) -> None:
+        self.layers: list[Layer] = []
+        self.warnings: list[str] = []
+        self._name = material.name
+        self._surface = surface
+        self._cache = cache
+        self._reading = reading
+        self._nodes = 0
+        self._in_alpha = False
+        used = (place for start in outputs(material) for place, _ in upstream_outputs(start))
+        self._alpha_used = {place.node for place in used if place.socket.name == "Alpha"}
+
+    def look(self) -> tuple[Color, Alpha | None]:
+        """The material's color and opacity.
+
+        Raises:
+            MeshError: as read_look.
+            NotReadError: a node is not read.
+        """
+        light, value = self._shader(source(self._surface))
+        if isinstance(light, _Transparent):
+            return PlainColor((0.0, 0.0, 0.0)), Opacity(Constant(0.0))
+        color: Color
+        if isinstance(light, PlainLight):
+            color = plain_color(light.rgb)
+        else:
+            color = light if isinstance(light, Texture) else Encoded(light)
+        opaque = isinstance(value, Constant) and value.number >= 1
+        return color, None if opaque else Opacity(value)
+
+    def channel(self, layer: Layer) -> int:
+        """The first channel of the corner values that belongs to a layer; adds it to what the mesh must offer."""
+        if layer not in self.layers:
+            self.layers.append(layer)
+        return sum(each.width for each in self.layers[: self.layers.index(layer)])
+
+    def _shader(self, place: Place) -> tuple[Light | _Transparent, Value]:
+        """Color and opacity of what a shader output shows."""
+        self._count(place)
+        kind = place.node.type
+        if not place.socket.is_output:
+            raise NotReadError(place.node, "lacks a shader")
+        if kind == "BSDF_PRINCIPLED":
+            shines = only_shines(place.node)
+            light = self._emission(place, "Emission ") if shines else self._light(place.input("Base Color"))
+            return light, self._opacity(place.input("Alpha"))
+        if kind == "BSDF_DIFFUSE":
+            return self._light(place.input("Color")), Constant(1.0)
+        if kind == "EMISSION":
+            return self._emission(place), Constant(1.0)
+        if kind == "BSDF_TRANSPARENT":
+            return _Transparent(), Constant(0.0)
+        if kind == "MIX_SHADER":
+            return self._mixed_shader(place)
+        raise NotReadError(place.node, "is a shader that is not read")
+
+    def _emission(self, place: Place, prefix: str = "") -> Light:
+        """What a shader emits, by its inputs Color and Strength, whose names begin with the prefix."""
+        strength = self._number(place.input(f"{prefix}Strength"), place.node, "Strength")
+        return _scaled(self._light(place.input(f"{prefix}Color")), (strength,) * 3, (0.0,) * 3)
+
+    def _mixed_shader(self, place: Place) -> tuple[Light | _Transparent, Value]:
+        factor = self._value(place.input(0))
+        if isinstance(factor, Constant) and (factor.number <= 0 or factor.number >= 1):
+            return self._shader(place.input(2 if factor.number >= 1 else 1))
+        (first, first_alpha), (second, second_alpha) = self._shader(place.input(1)), self._shader(place.input(2))
+        share: Value = Arithmetic("minimum", Arithmetic("maximum", factor, Constant(0.0)), Constant(1.0))
+        if isinstance(first, _Transparent):
+            return second, _product(share, second_alpha)
+        if isinstance(second, _Transparent):
+            return first, _product(Arithmetic("subtract", Constant(1.0), share), first_alpha)
+        raise NotReadError(place.node, "mixes two shaders")
+
+    def _opacity(self, place: Place) -> Value:
+        """The value at Alpha; opaque, with a warning, where it is not read."""
+        known = len(self.layers)
+        self._in_alpha = True
+        try:
+            return self._value(place)
+        except NotReadError as error:
+            del self.layers[known:]
+            self.warnings.append(f"material {self._name}: its Alpha depends on {error}; it counts as opaque")
+            return Constant(1.0)
+        finally:
+            self._in_alpha = False
+
+    def _count(self, place: Place) -> None:
+        self._nodes += 1
+        if self._nodes > MOST_NODES:
+            raise NotReadError(place.node, "ends a tree of too many nodes")
+
+    def _light(self, place: Place) -> Light:
+        """The color at an input: of the output that feeds it, or its own."""
+        self._count(place)
+        node, socket = place.node, place.socket
+        if not socket.is_output or node.type in {"RGB", "VALUE"}:
+            value = socket.default_value
+            # Vectors may have two dimensions.
+            rgb = (value,) * 3 if socket.type == "VALUE" else (*tuple(value)[:3], 0.0)[:3]
+            return PlainLight((_finite(rgb[0]), _finite(rgb[1]), _finite(rgb[2])))
+        if family(socket) == "VALUE":
+            number = self._value(place)
+            return PlainLight((number.number,) * 3) if isinstance(number, Constant) else Grey(number)
+        if node.type == "TEX_IMAGE":
+            texture = self._texture(place)
+            return self._missing(node) if texture is None else texture
+        if node.type in {"VERTEX_COLOR", "ATTRIBUTE"}:
+            return self._attribute(node) or PlainLight((0.0, 0.0, 0.0))
+        if node.type == "MIX" and node.data_type == "RGBA":
+            return self._mix(place, ("Factor_Float", "A_Color", "B_Color"), node.clamp_factor, node.clamp_result)
+        if node.type == "MIX_RGB":
+            return self._mix(place, ("Fac", "Color1", "Color2"), True, node.use_clamp)
+        if node.type == "VECT_MATH" and node.operation in {"MULTIPLY", "ADD", "MULTIPLY_ADD"}:
+            return self._vector_math(place)
+        raise NotReadError(node, "is not read")
+
+    def _mix(self, place: Place, names: tuple[str, str, str], clamp_factor: bool, clamp: bool) -> Light:
+        node = place.node
+        if node.blend_type not in {"MIX", "MULTIPLY"}:
+            raise NotReadError(node, f"blends by {node.blend_type.replace('_', ' ').lower()}")
+        inputs = [source(Place(by_identifier(node.inputs, name, node), place.groups)) for name in names]
+        factor = self._number(inputs[0], node, "factor")
+        if clamp_factor:
+            factor = min(max(factor, 0.0), 1.0)
+        first, second = self._light(inputs[1]), self._light(inputs[2])
+        mixed = Mix(first, second, factor, node.blend_type == "MULTIPLY", clamp)
+        plain = isinstance(first, PlainLight) and isinstance(second, PlainLight)
+        return _evaluated(mixed) if plain else mixed
+
+    def _vector_math(self, place: Place) -> Light:
+        node = place.node
+        lights = [self._light(place.input(number)) for number in range(3 if node.operation == "MULTIPLY_ADD" else 2)]
+        if node.operation in {"MULTIPLY", "ADD"} and isinstance(lights[0], PlainLight):
+            lights.reverse()
+        constants = [light.rgb for light in lights[1:] if isinstance(light, PlainLight)]
+        if len(constants) < len(lights) - 1:
+            raise NotReadError(node, "combines two colors that vary")
+        ones, zeros = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
+        scale = ones if node.operation == "ADD" else constants[0]
+        bias = zeros if node.operation == "MULTIPLY" else constants[-1]
+        return _scaled(lights[0], scale, bias)
+
+    def _attribute(self, node: bpy.types.Node) -> VertexColor | None:
+        """The color attribute that a node names; None where it names none."""
+        if node.type == "VERTEX_COLOR":
+            return VertexColor(self.channel(Layer("color", node.layer_name)))
+        if node.attribute_type != "GEOMETRY":
+            raise NotReadError(node, "reads no attribute of the mesh")
+        return VertexColor(self.channel(Layer("color", node.attribute_name))) if node.attribute_name else None
+
+    def check_images(self) -> None:
+        """Of what is to be baked: Cycles would decode images of any size, and show missing ones in magenta, silently.
+
+        Raises:
+            MeshError: as read_look.
+        """
+        self._in_alpha = False
+        for node, role in dict.fromkeys(upstream(self._surface)):
+            if node.type != "TEX_IMAGE" or role not in FIRST_ROLES:
+                continue
+            if node.image is not None:
+                check_limits(node.image, self._reading.limits)
+            has_pixels = node.image is not None and (node.image.size[0] or node.image.type == "MULTILAYER")
+            if role == "base color" and not has_pixels:
+                self._missing(node)
+
+    def _missing(self, node: bpy.types.Node) -> Light:
+        """What stands in for an image that is missing or broken."""
+        if self._in_alpha:
+            return PlainLight((1.0, 1.0, 1.0))
+        if node.image is None:
+            what = f"material {self._name}: {node.name}, which feeds Base Color, holds no image"
+        else:
+            what = why_unread(node.image)
+        if not self._reading.stand_in:
+            raise MeshError(f"{what}; repair it, give another (--texture, --ref-texture) or let it be magenta (--bake)")
+        self.warnings.append(f"{what}; magenta stands in for it")
+        return PlainLight(MISSING)
+
+    def _value(self, place: Place) -> Value:
+        """The number at an input: of the output that feeds it, or its own."""
+        self._count(place)
+        node, socket = place.node, place.socket
+        if family(socket) != "VALUE":
+            return _weighted(self._light(place), _AVERAGE if socket.type == "VECTOR" else _LUMINANCE)
+        if not socket.is_output or node.type == "VALUE":
+            return Constant(_finite(float(socket.default_value)))
+        if node.type == "TEX_IMAGE":
+            texture = self._texture(place)
+            return Constant(1.0) if texture is None else ImageAlpha(texture)
+        if node.type == "VERTEX_COLOR" or (node.type == "ATTRIBUTE" and socket.name == "Alpha"):
+            return self._attribute(node) or Constant(0.0)
+        if node.type == "LIGHT_PATH" and socket.name.startswith("Is "):
+            return Constant(float(socket.name == "Is Camera Ray"))  # the eye's
+        if node.type == "SEPXYZ" or (node.type == "SEPARATE_COLOR" and node.mode == "RGB"):
+            return _weighted(self._light(place.input(0)), _CHANNELS[socket.identifier])
+        if node.type == "MATH" and node.operation in _OPERATIONS:
+            first = self._value(place.input(0))
+            second = Constant(0.0) if node.operation == "ROUND" else self._value(place.input(1))
+            return _arithmetic(_OPERATIONS[node.operation], first, second, node.use_clamp)
+        if node.type == "MATH" and node.operation == "MULTIPLY_ADD":
+            first, second, third = (self._value(place.input(number)) for number in range(3))
+            return _arithmetic("add", _arithmetic("multiply", first, second), third, node.use_clamp)
+        raise NotReadError(node, "is not read")
+
+    def _number(self, place: Place, node: bpy.types.Node, what: str) -> float:
+        value = self._value(place)
+        if not isinstance(value, Constant):
+            raise NotReadError(node, f"has a {what} that varies")
+        return value.number
+
+    def _texture(self, place: Place) -> Texture | Tiles | None:
+        """The texture of an image node; None where its image is missing."""
+        node = place.node
+        image = node.image
+        if image is None:
+            return None
+        if node.projection != "FLAT":
+            raise NotReadError(node, f"has the projection {node.projection.lower()}")
+        if _is_mapped(node.texture_mapping):
+            raise NotReadError(node, "has a mapping of its own")
+        if image.source not in {"FILE", "GENERATED", "TILED"}:
+            raise NotReadError(node, f"shows a {image.source.lower()}")
+        known = len(self.layers)
+        placement = self._placement(place.input("Vector"))
+        texture = self._tiles(node, placement) if image.source == "TILED" else self._whole(node, placement)
+        if texture is None:
+            del self.layers[known:]
+        return texture
+
+    def _whole(self, node: bpy.types.Node, placement: Placement) -> Texture | None:
+        pixels = self._cache.pixels(node.image, self._reading.limits)
+        if pixels is None and node.image.type == "MULTILAYER":  # Cycles reads its first layer, Python none
+            raise NotReadError(node, "has an image of several layers")
+        return None if pixels is None else self._sampler(node, pixels, placement)
+
+    def _sampler(self, node: bpy.types.Node, pixels: Pixels, placement: Placement) -> Texture:
+        if pixels.values.dtype == np.uint8 and node.image.colorspace_settings.name not in LINEAR_SPACES | {"sRGB"}:
+            raise NotReadError(node, f"has an image in the color space {node.image.colorspace_settings.name}")
+        if pixels.unusual:
+            raise NotReadError(node, "has an image that stores its alpha in an unusual way")
+        return Texture(
+            pixels.values,
+            extension=_EXTENSIONS[node.extension],
+            interpolation=_INTERPOLATIONS[node.interpolation],
+            linear=pixels.linear,
+            unassociate=pixels.associated and node in self._alpha_used,
+            placement=placement,
+        )
+
+    def _tiles(self, node: bpy.types.Node, placement: Placement) -> Tiles | None:
+        image = node.image
+        if image.is_dirty:
+            raise NotReadError(node, "has tiles with unsaved changes")
+        tiles, missing = [], []
+        for tile in image.tiles:
+            pixels = self._cache.tile(image, tile.number, self._reading.limits)
+            if pixels is None:
+                missing.append(tile.number)
+            else:
+                tiles.append((tile_place(tile.number), self._sampler(node, pixels, Placement())))
+        if tiles:
+            self.warnings += [
+                f"material {self._name}: {tile_path(image, number)}, a tile of its image, is missing or broken; "
+                "it is magenta"
+                for number in missing
+            ]
+        return Tiles(tuple(tiles), placement) if tiles else None
+
+    def _placement(self, place: Place) -> Placement:
+        """Where the vector at an input lies on an image."""
+        node, socket = place.node, place.socket
+        fold: tuple[Fold, Fold] = ("none", "none")
+        if socket.is_output and node.type == "COMBXYZ":
+            fold, place = self._folded(place)
+        name, matrix = self._uv(place)
+        rows = np.array(matrix, np.float64)
+        affine = None
+        if not np.array_equal(rows, np.eye(4)):
+            (a, b, c), (d, e, f) = np.vectorize(_finite)(rows[:2][:, [0, 1, 3]]).tolist()
+            affine = ((a, b, c), (d, e, f))
+        return Placement(self.channel(Layer("uv", name)), affine, fold)
+
+    def _folded(self, place: Place) -> tuple[tuple[Fold, Fold], Place]:
+        """What is done to u and v apart, as the glTF importer does for unlike wrap modes; and the vector that they
+        are taken from."""
+        folds: list[Fold] = []
+        vectors = set()
+        for number, axis in enumerate("XY"):
+            taken = place.input(number)
+            fold: Fold = "none"
+            if taken.node.type == "MATH":
+                fold = self._fold_of(taken)
+                taken = taken.input(0)
+            if taken.node.type != "SEPXYZ" or taken.socket.name != axis:
+                raise NotReadError(place.node, "combines a vector of more than wrapped u and v")
+            folds.append(fold)
+            vectors.add(taken.input(0))
+        if len(vectors) > 1:
+            raise NotReadError(place.node, "combines two vectors")
+        return (folds[0], folds[1]), vectors.pop()
+
+    def _fold_of(self, place: Place) -> Fold:
+        node = place.node
+        limits = [self._number(place.input(number), node, "limit") for number in (1, 2)]
+        if node.operation == "WRAP" and sorted(limits) == [0, 1]:
+            return "wrap"
+        if node.operation == "PINGPONG" and limits[0] == 1:
+            return "pingpong"
+        raise NotReadError(node, "is not read")
+
+    def _uv(self, place: Place) -> tuple[str, Matrix]:
+        """The UV map that a vector is taken from, and the (4, 4) matrix that leads from (u, v, 0, 1) to it."""
+        self._count(place)
+        node, socket = place.node, place.socket
+        if not socket.is_output:
+            if node.type != "TEX_IMAGE":  # the socket of a group or a mapping: a constant vector
+                raise NotReadError(node, "has no vector")
+            return "", Matrix.Identity(4)
+        if node.type == "TEX_COORD" and socket.name == "UV" and not node.from_instancer:
+            return "", Matrix.Identity(4)
+        if node.type == "UVMAP" and not node.from_instancer:
+            return node.uv_map, Matrix.Identity(4)
+        if node.type == "ATTRIBUTE" and node.attribute_type == "GEOMETRY" and node.attribute_name:
+            return node.attribute_name, Matrix.Identity(4)
+        if node.type == "MAPPING":
+            name, before = self._uv(place.input("Vector"))
+            return name, self._mapping(place) @ before
+        raise NotReadError(node, "is not read as the vector of an image")
+
+    def _mapping(self, place: Place) -> Matrix:
+        node = place.node
+        scale, rotation = (self._vector(place.input(name), node) for name in ("Scale", "Rotation"))
+        turned = Euler(rotation, "XYZ").to_matrix().to_4x4()
+        if node.vector_type == "VECTOR":
+            return turned @ Matrix.Diagonal((*scale, 1.0))
+        if node.vector_type == "POINT":
+            return (
+                Matrix.Translation(self._vector(place.input("Location"), node)) @ turned @ Matrix.Diagonal((*scale, 1))
+            )
+        if node.vector_type == "TEXTURE":
+            back = Matrix.Diagonal((*(1 / x if x else 0.0 for x in scale), 1.0))  # as Blender divides by 0
+            moved = Matrix.Translation([-x for x in self._vector(place.input("Location"), node)])
+            return back @ turned.transposed() @ moved
+        raise NotReadError(node, f"maps as {node.vector_type.lower()}")
+
+    def _vector(self, place: Place, node: bpy.types.Node) -> tuple[float, float, float]:
+        light = self._light(place)
+        if not isinstance(light, PlainLight):
+            raise NotReadError(node, "has an input that varies")
+        return light.rgb
+
+
+def _is_mapped(mapping: bpy.types.TexMapping) -> bool:
+    """Whether an image node's own, hidden mapping does anything."""
+    return (
+        any((*mapping.translation, *mapping.rotation))
+        or tuple(mapping.scale) != (1, 1, 1)
+        or mapping.use_min
+        or mapping.use_max
+        or (mapping.mapping_x, mapping.mapping_y, mapping.mapping_z) != ("X", "Y", "Z")
+        or mapping.mapping != "FLAT"
+    )
+
+
+# --- Constants are evaluated at once, so that they can be told from what varies --------------------------------------
+
+_NOWHERE: Floats = np.zeros((1, 0))
+
+
+def _evaluated(light: Light) -> PlainLight:
+    red, green, blue = light.light_at(_NOWHERE)[0].tolist()
+    return PlainLight((_finite(red), _finite(green), _finite(blue)))
+
+
+def _scaled(light: Light, scale: tuple[float, ...], bias: tuple[float, ...]) -> Light:
+    if scale == (1.0, 1.0, 1.0) and bias == (0.0, 0.0, 0.0):
+        return light
+    scaled = Scaled(light, (scale[0], scale[1], scale[2]), (bias[0], bias[1], bias[2]))
+    return _evaluated(scaled) if isinstance(light, PlainLight) else scaled
+
+
+def _weighted(light: Light, weights: tuple[float, float, float]) -> Value:
+    weighted = Weighted(light, weights)
+    return Constant(float(weighted.value_at(_NOWHERE)[0])) if isinstance(light, PlainLight) else weighted
+
+
+def _arithmetic(operation: Operation, first: Value, second: Value, clamp: bool = False) -> Value:
+    value = Arithmetic(operation, first, second, clamp)
+    constant = isinstance(first, Constant) and isinstance(second, Constant)
+    return Constant(_finite(float(value.value_at(_NOWHERE)[0]))) if constant else value
+
+
+def _product(first: Value, second: Value) -> Value:
+    return first if isinstance(second, Constant) and second.number == 1 else _arithmetic("multiply", first, second)
