@@ -20,7 +20,7 @@ RAY_STEP = 1e-6
 BOUND_SLACK, BOUND_MARGIN = 1e-4, 1e-6
 # Every so many-th point is looked up first; its triangle bounds the distance of the points after it.
 _STRIDES = (64, 8, 1)
-_BATCH = 2048  # queries of a step
+_BATCH = 1024  # queries of a step
 _SURFACE_BATCH = 16384  # points of a step that asks no tree
 _CANDIDATES = 1 << 20  # faces around nearest points that are looked at at once: a fan's hub may have any number
 # Rays through a soup of overlapping triangles cross hundreds of them, and a tree is asked for each crossing, while

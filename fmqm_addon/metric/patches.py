@@ -64,11 +64,12 @@ def build_patch_mesh(surface: Surface, n_patches: int) -> Generator[float, None,
     """Triangles of the reference, with the edges of large ones split where one patch would be too coarse.
 
     If any triangle is larger than S_global / n_patches, the edges of all above S_global / (4 n_patches)
-    are halved until none is; otherwise nothing changes. Yields after each round of halving.
+    are halved until none is; otherwise nothing changes. Yields the share done, about.
     """
     vertices, triangles = surface.vertices, surface.triangles
     parent = np.arange(len(triangles))
     areas = triangle_areas(vertices, triangles)
+    yield 0.2
     target = float(areas.sum()) / n_patches
     was_split = bool(areas.max() > target * (1 + AREA_ROUNDING))
     if was_split:
@@ -76,8 +77,8 @@ def build_patch_mesh(surface: Surface, n_patches: int) -> Generator[float, None,
         while (areas > limit).any():
             vertices, triangles, cut_from = split_edges(vertices, triangles, areas > limit)
             parent = parent[cut_from]
-            areas = triangle_areas(vertices, triangles)
             yield 0.5
+            areas = triangle_areas(vertices, triangles)
     return PatchMesh(vertices, triangles, areas, parent, was_split)
 
 

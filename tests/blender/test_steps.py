@@ -15,7 +15,8 @@ from fmqm_addon.blender.measure import Measurement
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.spatial import Floats, Ints
 
-LONGEST = 0.1  # seconds of this thread's own time, so that a busy machine does not count
+LONGEST = 0.01  # of the whole, 10 s or so: a tenth of a second. A ratio, since machines are noisy
+RUNS = 2  # the same steps; what else the machine does does not strike the same one twice
 
 
 def test_steps_are_short_on_a_large_asset(
@@ -35,15 +36,19 @@ def test_steps_are_short_on_a_large_asset(
         in_trees[0] += time.thread_time() - began
 
     monkeypatch.setattr(BVHQuery, "__init__", timed)
-    measurement = Measurement(mesh, Settings())
-    steps = []
-    for stepper in (measurement.prepare(), measurement.compare(mesh)):
-        more = True
-        while more:
-            began, trees = time.thread_time(), in_trees[0]
-            more = stepper.step()
-            steps.append((time.thread_time() - began - (in_trees[0] - trees), stepper.progress))
-    steps.sort(key=lambda step: step[0])
-    record_property("longest", steps[-1][0])
-    print([(round(seconds, 3), progress.stage, round(progress.done, 3)) for seconds, progress in steps[-5:]])
-    assert steps[-1][0] < LONGEST, steps[-1]
+    runs: list[list[tuple[float, str]]] = []
+    for _ in range(RUNS):
+        measurement = Measurement(mesh, Settings())
+        steps = []
+        for stepper in (measurement.prepare(), measurement.compare(mesh)):
+            more = True
+            while more:
+                began, trees = time.thread_time(), in_trees[0]
+                more = stepper.step()
+                spent = time.thread_time() - began - (in_trees[0] - trees)
+                steps.append((spent, f"{stepper.progress.stage} {stepper.progress.done:.3f}"))
+        runs.append(steps)
+    best = sorted(min(same) for same in zip(*runs, strict=True))
+    record_property("longest", best[-1][0])
+    print(f"longest of {len(best)}:", [(round(seconds, 3), where) for seconds, where in best[-5:]])
+    assert best[-1][0] < LONGEST * sum(seconds for seconds, _ in best), best[-1]
