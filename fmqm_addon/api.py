@@ -16,7 +16,7 @@ import bpy
 
 from .blender.job import Outcome, measuring
 from .blender.looks import Reading
-from .blender.mesh import AS_FOUND
+from .blender.pair import Question
 from .blender.snapshot import target_of
 from .metric.score import COLUMNS, Result
 from .metric.settings import PRESETS, Settings
@@ -36,7 +36,7 @@ def measure(
     reference_without_modifiers: bool = False,
     both: bool = False,
     attribution: bool = False,
-    bake: int = AS_FOUND.bake,
+    bake: int = Reading.bake,
 ) -> list[Outcome]:
     """Scores of objects or collections against a reference.
 
@@ -58,15 +58,6 @@ def measure(
         with patches, samples and fields, `outcome.trust` a metric.trust.Trust: how far to believe the scores.
     """
     assets = [distorted] if isinstance(distorted, (bpy.types.Object, bpy.types.Collection)) else list(distorted)
-    stepper = measuring(
-        target_of(reference, bare=reference_without_modifiers),
-        [target_of(asset) for asset in assets],
-        settings or Settings(),
-        repeats,
-        space,
-        match_scale,
-        both,
-        attribution,
-        Reading(bake=bake),
-    )
-    return stepper.run()
+    asked = Question(settings or Settings(), repeats, space, match_scale, both, attribution, Reading(bake=bake))
+    reference_target = target_of(reference, bare=reference_without_modifiers)
+    return measuring(reference_target, [target_of(asset) for asset in assets], asked).run()

@@ -42,7 +42,7 @@ from fmqm_addon.report.pair import csv_parts, json_parts, table_parts, trust_par
 from fmqm_addon.report.pair_pictures import has_pictures, open_report_folder
 
 if TYPE_CHECKING:
-    from fmqm_addon.batch.run import Scored
+    from fmqm_addon.blender.pair import Answer
 
 MAX_BAKE = 16384  # pixels a side
 PROGRAM = "score.py"
@@ -322,7 +322,7 @@ def _score(
     keys = [row_key(row, options, versions) for row in rows]
     path = _journal_path(args)
     journal = Journal(path, args.resume)
-    scored = None
+    last = None
     with _folder_of_workers(path) as folder:
         if args.resume:
             adopt(folder, journal)
@@ -335,7 +335,7 @@ def _score(
         }
         tasks = list(waiting.values())
         try:
-            scored = _score_tasks(args, tasks, options, limits, argv, journal, folder)
+            last = _score_tasks(args, tasks, options, limits, argv, journal, folder)
         except KeyboardInterrupt:
             if path:
                 print(f"{PROGRAM}: interrupted; --resume goes on where {path} ends", file=sys.stderr)
@@ -346,14 +346,15 @@ def _score(
     code = _exit_code(records)
     batch = args.manifest or args.glob or args.lods or args.jobs or args.dask or args.journal or args.resume
     journal.close() if batch else journal.remove()
-    if scored is not None:
+    if last is not None:
         from fmqm_addon.report.fields import save_fields
         from fmqm_addon.report.picture import write_picture
 
+        result = last.comparison.result
         if args.save_fields:
-            save_fields(args.save_fields, scored.result)
+            save_fields(args.save_fields, result)
         if args.picture:
-            write_picture(args.picture, scored.reference, scored.distorted, scored.result)
+            write_picture(args.picture, last.reference, last.comparison.distorted, result)
     return code
 
 
@@ -365,8 +366,8 @@ def _score_tasks(
     argv: Sequence[str],
     journal: Journal,
     folder: Path,
-) -> Scored | None:
-    """On the cluster, by workers, or here."""
+) -> Answer | None:
+    """On the cluster, by workers, or here: then what came of the last pair."""
     if args.dask:
         tasks = [replace(task, row=replace(task.row, folder=os.path.abspath(task.row.folder))) for task in tasks]
         score_on_cluster(tasks, args.dask, argv, limits, journal, Log(PROGRAM, len(tasks), len(tasks), args.quiet))

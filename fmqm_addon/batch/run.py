@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -22,27 +22,17 @@ from .workers import end_when_stuck, end_with_parent, journal_of
 
 if TYPE_CHECKING:
     from ..blender.looks import Reading
-    from ..blender.measure import Comparison, Measurement
+    from ..blender.measure import Measurement
+    from ..blender.pair import Answer, Question
     from ..blender.space import Placed
-    from ..metric.score import Result, Stepper
-    from ..metric.settings import Settings
-    from ..metric.surface import MeshArrays, Surface
+    from ..metric.score import Stepper
 
 T = TypeVar("T")
 
 
-@dataclass(frozen=True)
-class Scored:
-    """The pair that was scored last, for its fields and picture."""
-
-    reference: Surface
-    distorted: Surface
-    result: Result
-
-
 def score_tasks(
     tasks: Sequence[Task], options: Options, journal: Journal, log: Log, before_each: Callable[[], None] | None = None
-) -> Scored | None:
+) -> Answer | None:
     """Scores all into the journal; a pair that fails does not stop the others. None if the last one failed.
 
     Args:
@@ -74,7 +64,7 @@ class _Scorer:
     """Where the work is, group after group."""
 
     def __init__(self, options: Options, journal: Journal, log: Log, before_each: Callable[[], None] | None) -> None:
-        self.last: Scored | None = None
+        self.last: Answer | None = None
         self._options = options
         self._journal = journal
         self._log = log
@@ -84,16 +74,17 @@ class _Scorer:
 
     def score(self, group: Sequence[Task]) -> None:
         """Prepares the reference that the tasks share, and scores them one by one."""
-        from ..blender.measure import Measurement
+        from ..blender.pair import measurement_of
 
-        options, row = self._options, group[0].row
+        row = group[0].row
+        asked = _question(self._options, row)
         self._begin(group[0])
         began = time.perf_counter()
         failure: FMQMError | None = None
         try:
             reference = self._load(row, row.reference, row.ref_texture)
-            self._tell_memory(reference, options.settings_of(row))
-            measurement = Measurement(reference.world(), options.settings_of(row), options.repeats)
+            self._tell_memory(reference, asked)
+            measurement = measurement_of(reference, asked)
             self._work(measurement.prepare(), "preparing the reference")
         except FMQMError as error:
             failure = error
@@ -129,49 +120,39 @@ class _Scorer:
         self._seconds = {}
 
     def _compare(self, pair: PairScore, row: Row, reference: Placed, measurement: Measurement) -> PairScore:
-        from ..blender.space import place
-        from ..blender.trust import known_facts
+        from ..blender.pair import answering
         from ..report.trust import trust_dict
 
-        options = self._options
         loaded = self._load(row, row.distorted, row.texture)
-        placement = place(reference, loaded, options.space, options.match_scale)
-        known = known_facts(placement, _reading(options))
-        compared = self._work(measurement.compare(placement.mesh, known), f"scoring {row.id}")
-        reverse = None
-        if options.both:
-            reverse = self._work(measurement.reverse(placement.mesh), f"scoring {row.id} as the reference")
-        result = compared.result
-        self.last = Scored(measurement.reference, compared.distorted, result)
+        answer = self._work(
+            answering(measurement, reference, loaded, _question(self._options, row)), f"scoring {row.id}"
+        )
+        self.last = answer
+        comparison, result = answer.comparison, answer.comparison.result
         return replace(
             pair,
-            scores=compared.scores,
-            stderr=compared.stderr,
+            scores=comparison.scores,
+            stderr=comparison.stderr,
             patches=len(result.patches),
             samples=len(result.samples.positions),
-            space=placement.label,
-            warnings=(*placement.notes, *placement.warnings, *compared.warnings),
-            reverse=reverse,
-            trust=trust_dict(compared.trust),
-            findings=self._findings(row, reference.world(), placement.mesh, compared, measurement),
+            space=answer.placement.label,
+            warnings=(*answer.placement.notes, *answer.warnings),
+            reverse=answer.reverse,
+            trust=trust_dict(comparison.trust),
+            findings=self._findings(row, answer),
         )
 
-    def _findings(
-        self, row: Row, reference: MeshArrays, distorted: MeshArrays, compared: Comparison, measurement: Measurement
-    ) -> dict[str, Any]:
+    def _findings(self, row: Row, answer: Answer) -> dict[str, Any]:
         """What else the options ask for."""
-        from ..blender.attribution import attribute
-
         findings: dict[str, Any] = {}
+        surfaces, result = (answer.reference, answer.comparison.distorted), answer.comparison.result
         if self._options.report:
             stem = picture_stem(row.reference, row.id, row.distorted)
-            surfaces = (measurement.reference, compared.distorted)
-            findings["pictures"] = write_pair_pictures(self._options.report, stem, *surfaces, compared.result)
+            findings["pictures"] = write_pair_pictures(self._options.report, stem, *surfaces, result)
         if self._options.explain:
-            findings["where"] = where(measurement.reference, compared.result)
-        if self._options.attribution:
-            stepper = attribute(measurement, reference, distorted, compared)
-            findings["attribution"] = self._work(stepper, f"attributing the loss of {row.id}").as_dict()
+            findings["where"] = where(answer.reference, result)
+        if answer.attribution is not None:
+            findings["attribution"] = answer.attribution.as_dict()
         return findings
 
     def _load(self, row: Row, name: str, image: str) -> Placed:
@@ -189,11 +170,11 @@ class _Scorer:
         finally:
             self._spent("load", time.perf_counter() - began)
 
-    def _tell_memory(self, reference: Placed, settings: Settings) -> None:
+    def _tell_memory(self, reference: Placed, asked: Question) -> None:
         from ..blender.memory import WORTH_SAYING, peak_bytes, peak_text
 
-        if peak_bytes(reference.mesh, settings, self._options.repeats) > WORTH_SAYING:
-            self._log.note(peak_text(reference.mesh, settings, self._options.repeats))
+        if peak_bytes(reference.mesh, asked.settings, asked.repeats) > WORTH_SAYING:
+            self._log.note(peak_text(reference.mesh, asked.settings, asked.repeats))
 
     def _work(self, stepper: Stepper[T], text: str) -> T:
         """Runs a stepper to its end with its progress shown and its seconds added up by stage."""
@@ -205,6 +186,20 @@ class _Scorer:
 
     def _spent(self, stage: str, seconds: float) -> None:
         self._seconds[stage] = self._seconds.get(stage, 0.0) + seconds
+
+
+def _question(options: Options, row: Row) -> Question:
+    from ..blender.pair import Question
+
+    return Question(
+        options.settings_of(row),
+        options.repeats,
+        options.space,
+        options.match_scale,
+        options.both,
+        options.attribution,
+        _reading(options),
+    )
 
 
 def _reading(options: Options) -> Reading:

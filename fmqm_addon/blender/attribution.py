@@ -17,7 +17,7 @@ import numpy as np
 
 from ..metric.color import Material
 from ..metric.fields import closest_on
-from ..metric.score import COLUMNS, Progress, Stepper, Work
+from ..metric.score import COLUMNS, Progress, Stepper, Work, as_part
 from ..metric.spatial import Floats, Ints
 from ..metric.surface import MeshArrays, Surface
 from .measure import Comparison, Measurement
@@ -87,7 +87,7 @@ def attribute(
 def _attribute(
     measurement: Measurement, reference: MeshArrays, distorted: MeshArrays, compared: Comparison
 ) -> Work[Attribution]:
-    yield Progress("attribution", 0.0)
+    yield Progress("prepare", 0.0)
     theirs, own = _counterparts(distorted, reference), _counterparts(reference, distorted)
     how: How = "nearest points"
     if theirs is not None and own is not None and _lie_alike(measurement.reference, compared):
@@ -100,10 +100,8 @@ def _attribute(
         )
     losses: list[float] = []
     for mesh in painted:
-        comparing = measurement.compare(mesh)
-        while comparing.step():
-            yield Progress("attribution", 0.5 * len(losses) + 0.5 * comparing.progress.done)
-        losses.append(max(0.0, 1.0 - float(comparing.result.scores[_FMQM])))
+        painting = yield from as_part(measurement.compare(mesh), 0.5 * len(losses), 0.5)
+        losses.append(max(0.0, 1.0 - float(painting.scores[_FMQM])))
     return Attribution(losses[0], losses[1], how)
 
 

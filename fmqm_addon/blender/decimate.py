@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..metric.errors import FMQMError, MeshError
-from ..metric.score import COLUMNS, Progress, Stepper, Work
+from ..metric.score import COLUMNS, Progress, Stepper, Work, as_part
 from ..metric.settings import FAST_SCORED_PATCHES, Settings
 from ..metric.surface import MeshArrays, weld
 from .measure import Measurement
@@ -109,9 +109,7 @@ class Search:
         rounds = (True, False) if self._two_rounds else (False,)
         for number, quick in enumerate(rounds):
             measurement = Measurement(asset, self._settings[quick])
-            preparing = measurement.prepare()
-            while preparing.step():
-                yield Progress("Preparing", (number + preparing.progress.done) / len(rounds))
+            yield from as_part(measurement.prepare(), number / len(rounds), 1 / len(rounds), "Preparing")
             self._measurements[quick] = measurement
         self.warnings = self._measurements[False].reference.warnings
 
@@ -190,9 +188,8 @@ class Search:
             mesh = self._read(version)
             triangles = len(mesh.triangles)
             comparing = self._measurements[quick].compare(mesh)
-            while comparing.step():
-                yield Progress(what, done + (1 - done) * _PER_STEP * comparing.progress.done)
-            fmqm = float(comparing.result.scores[_FMQM])
+            compared = yield from as_part(comparing, done, (1 - done) * _PER_STEP, what)
+            fmqm = float(compared.scores[_FMQM])
         except MeshError:
             pass  # nothing is left of it: it misses any target
         step = Step(version, triangles, fmqm, quick)

@@ -26,13 +26,21 @@ class Shine(Enum):
 
 def is_opaque(tree: bpy.types.NodeTree) -> bool:
     """Whether none of its nodes, its groups' among them, can make a material transparent."""
-    for node in tree.nodes:
-        alpha = node.inputs.get("Alpha") if any(socket.type == "SHADER" for socket in node.outputs) else None
-        if node.type in _TRANSPARENT or (alpha is not None and (alpha.is_linked or alpha.default_value < 1)):
-            return False
-        if node.type == "GROUP" and node.node_tree is not None and not is_opaque(node.node_tree):
-            return False
-    return True
+    return not any(_lets_through(node) for each in _with_groups(tree) for node in each.nodes)
+
+
+def _lets_through(node: bpy.types.Node) -> bool:
+    alpha = node.inputs.get("Alpha") if any(socket.type == "SHADER" for socket in node.outputs) else None
+    return node.type in _TRANSPARENT or (alpha is not None and (alpha.is_linked or alpha.default_value < 1))
+
+
+def _with_groups(tree: bpy.types.NodeTree) -> list[bpy.types.NodeTree]:
+    """The tree and those of its groups, each once."""
+    trees = [tree]
+    for each in trees:
+        inner = [node.node_tree for node in each.nodes if node.type == "GROUP" and node.node_tree is not None]
+        trees += [found for found in dict.fromkeys(inner) if found not in trees]
+    return trees
 
 
 def shining(material: bpy.types.Material, shine: Shine, temporary: ExitStack) -> bpy.types.Material:

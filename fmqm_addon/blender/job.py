@@ -8,19 +8,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from ..metric.errors import FMQMError
-from ..metric.score import Progress, Stepper, Work
-from ..metric.settings import Settings
+from ..metric.score import Progress, Stepper, Work, as_part
 from ..metric.spatial import Floats
-from ..metric.surface import Surface
 from ..metric.trust import Trust
-from .attribution import Attribution, attribute
+from .attribution import Attribution
 from .images import TextureCache
 from .looks import Reading
-from .measure import Comparison, Measurement
-from .mesh import AS_FOUND
+from .measure import Comparison
+from .pair import Answer, Question, answering, measurement_of
 from .snapshot import Target, bakes, fingerprint, take
-from .space import Placed, Placement, place, place_counts
-from .trust import known_facts
+from .space import Placed, Placement, place_counts
 
 _READING = 0.05  # share of the whole that reading the scene takes, about
 
@@ -31,27 +28,26 @@ class Outcome:
 
     Attributes:
         reference_target, target: what was asked for.
-        reference, comparison, placement: None where there is an error.
+        answer: None where there is an error.
         triangles, reference_triangles: counts after triangulation, before anything is left out.
         seconds: by report.pair.STAGES; reading and preparing the reference count in the first outcome.
         fingerprint: of reference and compared, as they were when they were read; see pair_fingerprint.
-        reverse: (5,) float64 scores of the other direction, where they were asked for.
-        attribution: whose loss it is, where that was asked for.
         error: why there is no score.
     """
 
     reference_target: Target
     target: Target
-    reference: Surface | None = None
-    comparison: Comparison | None = None
-    placement: Placement | None = None
+    answer: Answer | None = None
     triangles: int = 0
     reference_triangles: int = 0
     seconds: dict[str, float] = field(default_factory=dict)
     fingerprint: tuple[str, str] = ("", "")
-    reverse: Floats | None = None
-    attribution: Attribution | None = None
     error: str | None = None
+
+    @property
+    def comparison(self) -> Comparison | None:
+        """Scores, patches, samples and fields; None where there is an error."""
+        return None if self.answer is None else self.answer.comparison
 
     @property
     def scores(self) -> Floats | None:
@@ -64,10 +60,19 @@ class Outcome:
         return None if self.comparison is None else self.comparison.trust
 
     @property
+    def reverse(self) -> Floats | None:
+        """(5,) float64 scores of the other direction; None where they were not asked for, or there is an error."""
+        return None if self.answer is None else self.answer.reverse
+
+    @property
+    def attribution(self) -> Attribution | None:
+        """Whose loss it is; None where that was not asked for, or there is an error."""
+        return None if self.answer is None else self.answer.attribution
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """What should be known before the scores are believed."""
-        own = () if self.placement is None else self.placement.warnings
-        return own + (() if self.comparison is None else self.comparison.warnings)
+        return () if self.answer is None else self.answer.warnings
 
 
 def pair_fingerprint(reference: Target, target: Target, label: str) -> tuple[str, str]:
@@ -79,13 +84,7 @@ def pair_fingerprint(reference: Target, target: Target, label: str) -> tuple[str
 def measuring(
     reference: Target,
     compared: Sequence[Target],
-    settings: Settings,
-    repeats: int = 1,
-    space: str = "auto",
-    match_scale: bool = False,
-    both: bool = False,
-    attribution: bool = False,
-    reading: Reading = AS_FOUND,
+    asked: Question,
     finished: Callable[[Outcome], None] = lambda _: None,
 ) -> Stepper[list[Outcome]]:
     """A stepper over reading, preparing and comparing.
@@ -94,34 +93,18 @@ def measuring(
     An asset that fails has its error in its outcome and does not stop the others.
 
     Args:
-        repeats: seeds settings.seed to settings.seed + repeats - 1.
-        space, match_scale: as in blender.space.place.
-        both: score the other direction too.
-        attribution: score geometry and texture apart too.
-        reading: how the materials are read.
         finished: gets each outcome as soon as it is there.
     """
-    return Stepper(
-        _work(reference, compared, settings, repeats, space, match_scale, both, attribution, reading, finished)
-    )
+    return Stepper(_work(reference, compared, asked, finished))
 
 
 def _work(
-    reference: Target,
-    compared: Sequence[Target],
-    settings: Settings,
-    repeats: int,
-    space: str,
-    match_scale: bool,
-    both: bool,
-    attribution: bool,
-    reading: Reading,
-    finished: Callable[[Outcome], None],
+    reference: Target, compared: Sequence[Target], asked: Question, finished: Callable[[Outcome], None]
 ) -> Work[list[Outcome]]:
     # Read all, then measure: the user may go on working meanwhile.
     read = []
     for index, target in enumerate((reference, *compared)):
-        item = yield from _read(target, reading, _READING * index / (len(compared) + 1))
+        item = yield from _read(target, asked.reading, _READING * index / (len(compared) + 1))
         read.append(item)
     share = (1 - _READING) / (len(compared) + 1)
     outcomes: list[Outcome] = []
@@ -129,11 +112,10 @@ def _work(
     shared = {"load": original.seconds}
     error, measurement = original.error, None
     if original.placed is not None:
-        measurement = Measurement(original.placed.world(), settings, repeats)
+        measurement = measurement_of(original.placed, asked)
         preparing = measurement.prepare()
         try:
-            while preparing.step():
-                yield Progress(f"Preparing {reference.label}", _READING + share * preparing.progress.done)
+            yield from as_part(preparing, _READING, share, f"Preparing {reference.label}")
         except FMQMError as reason:
             error, measurement = str(reason), None
         shared = _added(shared, preparing.seconds)
@@ -142,39 +124,17 @@ def _work(
         seconds = _added(shared if index == 0 else {}, {"load": item.seconds})
         if measurement is not None and original.placed is not None and item.placed is not None:
             began = _READING + share * (index + 1)
+            stepper = answering(measurement, original.placed, item.placed, asked)
             try:
-                placement = place(original.placed, item.placed, space, match_scale)
-                comparing = measurement.compare(placement.mesh, known_facts(placement, reading))
-                one = share / (1 + both + 2 * attribution)
-                while comparing.step():
-                    yield Progress(f"Measuring {item.target.label}", began + one * comparing.progress.done)
-                seconds = _added(seconds, comparing.seconds)
-                reverse = None
-                if both:
-                    turned = measurement.reverse(placement.mesh)
-                    while turned.step():
-                        yield Progress(f"Measuring from {item.target.label}", began + one * (1 + turned.progress.done))
-                    reverse = turned.result
-                    seconds = _added(seconds, turned.seconds)
-                whose = None
-                if attribution:
-                    attributing = attribute(measurement, original.placed.world(), placement.mesh, comparing.result)
-                    while attributing.step():
-                        done = began + one * (1 + both + 2 * attributing.progress.done)
-                        yield Progress(f"Attributing {item.target.label}", done)
-                    whose = attributing.result
-                    seconds = _added(seconds, attributing.seconds)
+                answer = yield from as_part(stepper, began, share, f"Measuring {item.target.label}")
+                seconds = _added(seconds, stepper.seconds)
                 outcome = Outcome(
                     reference,
                     item.target,
-                    reference=measurement.reference,
-                    comparison=comparing.result,
-                    placement=placement,
+                    answer,
                     triangles=len(item.placed.mesh.triangles),
                     reference_triangles=len(original.placed.mesh.triangles),
-                    fingerprint=(original.mark(placement), item.mark(placement)),
-                    reverse=reverse,
-                    attribution=whose,
+                    fingerprint=(original.mark(answer.placement), item.mark(answer.placement)),
                     seconds={**seconds, "total": sum(seconds.values())},
                 )
             except FMQMError as reason:

@@ -9,19 +9,22 @@ from __future__ import annotations
 import bpy
 
 from ..metric.color import ImageFacts, Material
+from ..metric.errors import MeshError
 from .images import TextureCache
 from .looks import Layer, Look, Reading, Unread
-from .nodes import NotReadError, only_shines, outputs, surface_of, upstream, uses_nodes
+from .nodes import NotReadError, node_count, only_shines, outputs, surface_of, upstream, uses_nodes
 from .reader import FIRST_ROLES, Reader, plain_color
 
 DEFAULT_GREY = 0.8  # linear base color that Blender gives a surface without a material
+MOST_NODES = 100_000  # of a material; renderers copy groups as often as they are used
 
 
 def read_look(material: bpy.types.Material | None, cache: TextureCache, reading: Reading) -> Look | Unread:
     """The look of a material; the same object for the same material of a cache.
 
     Raises:
-        MeshError: a base-color image cannot be read and reading.stand_in is off, or an image exceeds the limits.
+        MeshError: a base-color image cannot be read and reading.stand_in is off, an image exceeds the limits, or
+            the nodes are too many.
     """
     key = 0 if material is None else material.original.as_pointer()
     if key not in cache.looks:
@@ -41,6 +44,11 @@ def _read_look(material: bpy.types.Material | None, cache: TextureCache, reading
     if surface is None:
         why = "has no shader" if uses_nodes(material) else "does not use nodes"
         return plain_look(material, f"material {material.name} {why}; its viewport color is taken")
+    if node_count(material.node_tree) > MOST_NODES:
+        raise MeshError(
+            f"material {material.name} has more than {MOST_NODES:,} nodes, those of groups counted as often as they "
+            "are used; simplify it or bake it to an image"
+        )
     reader = Reader(material, surface, cache, reading)
     try:
         color, alpha = reader.look()

@@ -5,12 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from ..metric.errors import MeshError
-from ..metric.score import COLUMNS, Evaluation, Progress, Result, Stepper, Work, as_work
+from ..metric.score import COLUMNS, Evaluation, Progress, Result, Stepper, Work, as_part, as_work
 from ..metric.settings import Settings
 from ..metric.spatial import Floats
 from ..metric.surface import MeshArrays, Surface, preparing_surface
@@ -80,7 +79,7 @@ class Measurement:
         yield Progress("prepare", 0.05)
         for repeat in range(self._repeats):
             evaluation = Evaluation(surface, self._settings.with_seed(self._settings.seed + repeat))
-            yield from _scaled(evaluation.prepare(), 0.05 + 0.95 * repeat / self._repeats, 0.95 / self._repeats)
+            yield from as_part(evaluation.prepare(), 0.05 + 0.95 * repeat / self._repeats, 0.95 / self._repeats)
             self._evaluations.append(evaluation)
 
     def _compare(self, distorted: MeshArrays, known: Sequence[Fact]) -> Work[Comparison]:
@@ -98,7 +97,7 @@ class Measurement:
 
     def _reverse(self, distorted: MeshArrays) -> Work[Floats]:
         other = Measurement(distorted, self._settings, self._repeats)
-        yield from _scaled(other.prepare(), 0.0, 0.5)
+        yield from as_part(other.prepare(), 0.0, 0.5)
         _, results = yield from other._results(self._mesh, 0.5, 0.5)
         scores: Floats = np.mean([result.scores for result in results], axis=0)
         return scores
@@ -112,12 +111,11 @@ class Measurement:
         results = []
         each = 0.95 * share / self._repeats
         for repeat, evaluation in enumerate(self._evaluations):
-            stepper = evaluation.compare(surface)
+            comparing = evaluation.compare(surface)
             try:
-                yield from _scaled(stepper, first + 0.05 * share + each * repeat, each)
+                results.append((yield from as_part(comparing, first + 0.05 * share + each * repeat, each)))
             except MeshError as error:
                 raise MeshError(f"{distorted.name}: {error}") from error
-            results.append(stepper.result)
         if not all(np.isfinite(result.scores).all() for result in results):
             raise MeshError(
                 f"{distorted.name}: the scores are not finite; its coordinates are beyond what can be measured"
@@ -129,9 +127,3 @@ def _error_fact(stderr: Floats | None, repeats: int) -> Fact:
     if stderr is None:
         return Fact("standard_error", None, "of FMQM", "measured with one seed; repeats tell it")
     return Fact("standard_error", float(stderr[COLUMNS.index("FMQM")]), f"of FMQM, over {repeats} seeds")
-
-
-def _scaled(stepper: Stepper[Any], first: float, share: float) -> Work[None]:
-    """The steps of a stepper as a part of larger work."""
-    while stepper.step():
-        yield Progress(stepper.progress.stage, first + share * stepper.progress.done)

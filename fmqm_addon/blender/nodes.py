@@ -5,12 +5,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import inf
 from typing import Any
 
 import bpy
 
 from ..metric.errors import FMQMError
 
+DEEPEST = 100  # groups within groups
 _ROLES = {"Base Color": "base color", "Color": "base color", "Alpha": "alpha", "Fac": "alpha", "Factor": "alpha"}
 
 
@@ -54,6 +56,18 @@ def active_output(tree: bpy.types.NodeTree) -> bpy.types.Node | None:
 def uses_nodes(material: bpy.types.Material) -> bool:
     """Before Blender 5 a material may have nodes and not use them; later use_nodes has no effect, and warns."""
     return material.node_tree is not None and (bpy.app.version >= (5, 0) or material.use_nodes)
+
+
+def node_count(tree: bpy.types.NodeTree, known: dict[bpy.types.NodeTree, float] | None = None, depth: int = 0) -> float:
+    """How many nodes a renderer makes of a tree, those of a group as often as it is used; infinite if they are nested
+    deeper than DEEPEST. Groups within groups, each used twice, soon have any number."""
+    known = {} if known is None else known
+    if depth > DEEPEST:
+        return inf
+    if tree not in known:
+        inner = (node.node_tree for node in tree.nodes if node.type == "GROUP" and node.node_tree is not None)
+        known[tree] = len(tree.nodes) + sum(node_count(each, known, depth + 1) for each in inner)
+    return known[tree]
 
 
 def surface_of(material: bpy.types.Material) -> Place | None:

@@ -213,6 +213,13 @@ class Evaluation:
         )
 
 
+def as_part(stepper: Stepper[T], first: float, share: float, stage: str | None = None) -> Work[T]:
+    """The steps of a stepper as a part of larger work, which may call all of them one stage; ends in its result."""
+    while stepper.step():
+        yield Progress(stage or stepper.progress.stage, first + share * stepper.progress.done)
+    return stepper.result
+
+
 def as_work(work: Generator[float, None, T], stage: str, first: float, last: float) -> Work[T]:
     """Something that yields its own share done, as the part of a stepper's work from first to last."""
     while True:

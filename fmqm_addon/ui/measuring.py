@@ -12,6 +12,7 @@ import numpy as np
 from bl_operators.presets import AddPresetBase
 
 from ..blender.job import Outcome, measuring
+from ..blender.pair import Question
 from ..blender.snapshot import Target, target_of
 from ..metric.errors import FMQMError
 from ..metric.score import Stepper
@@ -72,10 +73,7 @@ class FMQM_OT_measure(SteppedOperator, bpy.types.Operator):  # noqa: N801
         self.stepper = measuring(
             target_of(reference_of(fmqm), fmqm.bare_reference),
             list(dict.fromkeys(compared)),
-            settings,
-            **asked,
-            both=fmqm.settings.both,
-            attribution=fmqm.settings.attribution,
+            Question(settings, **asked, both=fmqm.settings.both, attribution=fmqm.settings.attribution),
         )
         return True
 
@@ -137,23 +135,23 @@ def _write_row(fmqm: FMQMScene, outcome: Outcome, settings_text: str) -> None:
     row.stages = json.dumps(outcome.seconds)
     row.triangles = outcome.triangles
     row.share = 100 * outcome.triangles / outcome.reference_triangles if outcome.reference_triangles else 0.0
-    comparison, placement = outcome.comparison, outcome.placement
-    row.space = "" if placement is None else placement.label
-    row.scores = "" if comparison is None else numbers_text(comparison.scores)
-    row.stderr = "" if comparison is None or comparison.stderr is None else numbers_text(comparison.stderr)
     row.reverse = "" if outcome.reverse is None else numbers_text(outcome.reverse)
     row.attribution = "" if outcome.attribution is None else json.dumps(outcome.attribution.as_dict(), allow_nan=False)
     row.trust = "" if outcome.trust is None else json.dumps(trust_dict(outcome.trust), allow_nan=False)
+    answer, comparison = outcome.answer, outcome.comparison
+    row.space = "" if answer is None else answer.placement.label
+    row.scores = "" if comparison is None else numbers_text(comparison.scores)
+    row.stderr = "" if comparison is None or comparison.stderr is None else numbers_text(comparison.stderr)
     row.patches = 0 if comparison is None else len(comparison.result.patches)
     row.samples = 0 if comparison is None else len(comparison.result.samples.positions)
-    if comparison is not None and placement is not None and outcome.reference is not None:
+    if answer is not None:
         session.put(
             row.uid,
             session.Measured(
-                reference=outcome.reference,
-                comparison=comparison,
+                reference=answer.reference,
+                comparison=answer.comparison,
                 reference_to_world=np.eye(4),  # it is measured where it stands
-                distorted_to_world=placement.to_world,
+                distorted_to_world=answer.placement.to_world,
             ),
         )
 

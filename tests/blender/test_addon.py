@@ -444,10 +444,11 @@ def test_python_api(lods: list[bpy.types.Object]) -> None:
 def test_stepping_needs_no_scene(lods: list[bpy.types.Object]) -> None:
     """Objects may be deleted, or the file replaced, once the first steps have read them."""
     from fmqm_addon.blender.job import measuring
+    from fmqm_addon.blender.pair import Question
     from fmqm_addon.blender.snapshot import target_of
 
     expected = api.measure(lods[0], lods[1], QUICK)[0].scores
-    stepper = measuring(target_of(lods[0]), [target_of(lods[1])], QUICK)
+    stepper = measuring(target_of(lods[0]), [target_of(lods[1])], Question(QUICK))
     while stepper.progress.stage.startswith("Reading") or not stepper.progress.stage:
         assert stepper.step()
     bpy.data.objects.remove(lods[1])
@@ -457,9 +458,10 @@ def test_stepping_needs_no_scene(lods: list[bpy.types.Object]) -> None:
 
 def test_the_scene_changes_before_it_is_read(lods: list[bpy.types.Object]) -> None:
     from fmqm_addon.blender.job import measuring
+    from fmqm_addon.blender.pair import Question
     from fmqm_addon.blender.snapshot import target_of
 
-    stepper = measuring(target_of(lods[0]), [target_of(lod) for lod in lods[1:]], QUICK)
+    stepper = measuring(target_of(lods[0]), [target_of(lod) for lod in lods[1:]], Question(QUICK))
     stepper.step()
     bpy.data.objects.remove(lods[2])
     outcomes = stepper.run()

@@ -18,6 +18,7 @@ from fmqm_addon.blender.attribution import Attribution, attribute
 from fmqm_addon.blender.files import load_mesh
 from fmqm_addon.blender.job import measuring
 from fmqm_addon.blender.measure import Measurement
+from fmqm_addon.blender.pair import Question
 from fmqm_addon.blender.snapshot import target_of
 from fmqm_addon.metric.settings import PRESETS, Settings
 from fmqm_addon.metric.surface import MeshArrays
@@ -192,14 +193,14 @@ def said() -> list[str]:
 
 
 def test_attribution_from_python_and_its_progress(monkeys: list[bpy.types.Object]) -> None:
-    """It is the last part of an object's share, after the other direction, and changes no score."""
+    """Its progress is a part of its object's; it changes no score."""
     plain = api.measure(*monkeys, SMALL, both=True)[0]
-    stepper = measuring(target_of(monkeys[0]), [target_of(monkeys[1])], SMALL, both=True, attribution=True)
+    stepper = measuring(target_of(monkeys[0]), [target_of(monkeys[1])], Question(SMALL, both=True, attribution=True))
     seen = [("", 0.0)]
     while stepper.step():
         seen.append((stepper.progress.stage, stepper.progress.done))
     assert [done for _, done in seen] == sorted(done for _, done in seen) and 0.95 < seen[-1][1] <= 1
-    assert list(dict.fromkeys(stage for stage, _ in seen))[-2:] == ["Measuring from 2", "Attributing 2"]
+    assert list(dict.fromkeys(stage for stage, _ in seen))[-2:] == ["Preparing 1", "Measuring 2"]
     (outcome,) = stepper.result
     assert plain.attribution is None and outcome.attribution is not None
     assert np.array_equal(plain.scores, outcome.scores) and np.array_equal(plain.reverse, outcome.reverse)

@@ -232,6 +232,38 @@ def test_a_very_long_chain_is_left_to_the_baker() -> None:
     assert isinstance(found, Unread) and "too many" in found.why
 
 
+def doubled_groups(levels: int, empty: bool) -> bpy.types.Material:
+    """Before Base Color, groups within groups, each used twice: 2 ** levels gammas in a row, or nothing at all."""
+    inner: bpy.types.NodeTree | None = None
+    for level in range(levels):
+        tree = bpy.data.node_groups.new(f"Level {level}", "ShaderNodeTree")
+        for way in ("INPUT", "OUTPUT"):
+            tree.interface.new_socket("Color", in_out=way, socket_type="NodeSocketColor")
+        last = tree.nodes.new("NodeGroupInput").outputs[0]
+        for _ in range(0 if empty and inner is None else 2):
+            node = tree.nodes.new("ShaderNodeGamma" if inner is None else "ShaderNodeGroup")
+            if inner is not None:
+                node.node_tree = inner
+            tree.links.new(last, node.inputs[0])
+            last = node.outputs[0]
+        tree.links.new(last, tree.nodes.new("NodeGroupOutput").inputs[0])
+        inner = tree
+    material = scenes.material("Doubled")
+    group = material.node_tree.nodes.new("ShaderNodeGroup")
+    group.node_tree = inner
+    material.node_tree.links.new(group.outputs[0], scenes.base_color(material))
+    return material
+
+
+@pytest.mark.parametrize("empty", [False, True])
+def test_groups_that_double_in_each_other_end(empty: bool) -> None:
+    """A million nodes; Cycles would make them all."""
+    with pytest.raises(MeshError, match="material Doubled has more than 100,000 nodes"):
+        read_look(doubled_groups(20, empty), TextureCache(), Reading())
+    few = read_look(doubled_groups(8, empty), TextureCache(), Reading())
+    assert isinstance(few, Look if empty else Unread)
+
+
 def test_alpha_that_is_not_read_is_opaque_with_a_warning(tmp_path: Path) -> None:
     material = scenes.material("Leaf")
     scenes.image_node(material, loaded(tmp_path, scenes.noise()))

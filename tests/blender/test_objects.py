@@ -23,6 +23,7 @@ from fmqm_addon.blender.job import measuring
 from fmqm_addon.blender.looks import Reading
 from fmqm_addon.blender.measure import Measurement
 from fmqm_addon.blender.mesh import mesh_arrays
+from fmqm_addon.blender.pair import Question
 from fmqm_addon.blender.snapshot import fingerprint, take, target_of
 from fmqm_addon.blender.space import place
 from fmqm_addon.metric.color import decode_srgb
@@ -178,7 +179,7 @@ def test_inputs_of_geometry_nodes_are_noticed() -> None:
 @pytest.mark.parametrize("make", KINDS, ids=lambda make: make.__name__)
 def test_kinds_score_1_against_themselves(make: Callable[[], bpy.types.Object]) -> None:
     object_ = make()
-    (outcome,) = measuring(target_of(object_), [target_of(object_)], Settings(samples=800, patches=8)).run()
+    (outcome,) = measuring(target_of(object_), [target_of(object_)], Question(Settings(samples=800, patches=8))).run()
     assert outcome.error is None and outcome.scores.tolist() == [1.0] * 5
 
 
@@ -729,7 +730,7 @@ def test_the_panel_says_that_it_bakes() -> None:
     next(node for node in tree.nodes if node.type == "SET_MATERIAL").inputs["Material"].default_value = procedural()
     few = Settings(samples=400, patches=4)
     compared = [target_of(instances), target_of(plain), target_of(nodes)]
-    stepper = measuring(target_of(stone), compared, few, reading=Reading(bake=32))
+    stepper = measuring(target_of(stone), compared, Question(few, reading=Reading(bake=32)))
     stages = []
     while stepper.step():
         stages.append(stepper.progress.stage)
