@@ -26,7 +26,7 @@ How = Literal["materials", "nearest points"]
 Mostly = Literal["nothing", "geometry", "texture", "both"]
 
 AGREES = 0.02  # of the texture's side: what noise and decimation shift texture coordinates by at most
-MOST = 0.8  # of the samples; seams and far-moved parts are the rest
+MOST = 0.8  # of the samples or triangles; seams and far-moved parts are the rest
 LITTLE = 0.02  # loss of FMQM that is not worth asking whose it is
 CLEARLY = 2.0  # one loss is this many times the other: it is most of it
 
@@ -90,7 +90,8 @@ def _attribute(
     yield Progress("prepare", 0.0)
     theirs, own = _counterparts(distorted, reference), _counterparts(reference, distorted)
     how: How = "nearest points"
-    if theirs is not None and own is not None and _lie_alike(measurement.reference, compared):
+    alike = _unwrapped_alike(reference, distorted) or _lie_alike(measurement.reference, compared)
+    if theirs is not None and own is not None and alike:
         how = "materials"
         painted = replace(distorted, materials=theirs), replace(reference, materials=own)
     else:
@@ -113,6 +114,14 @@ def _counterparts(mesh: MeshArrays, other: MeshArrays) -> tuple[Material, ...] |
     if len(by_name) == len(other.materials) and all(material.name in by_name for material in mesh.materials):
         return tuple(by_name[material.name] for material in mesh.materials)
     return other.materials if len(mesh.materials) == len(other.materials) else None
+
+
+def _unwrapped_alike(reference: MeshArrays, distorted: MeshArrays) -> bool:
+    """Whether the two have the same triangles with about the same corner values, wherever their vertices are."""
+    if reference.corners.shape != distorted.corners.shape:
+        return False
+    apart = np.abs(reference.corners - distorted.corners).max(axis=(1, 2), initial=0.0)
+    return float(np.mean(apart <= AGREES)) >= MOST
 
 
 def _lie_alike(reference: Surface, compared: Comparison) -> bool:

@@ -28,8 +28,8 @@ PLACE_LABELS = {"world": "world", "location": "world without location", "local":
 APART = 0.01  # of the diagonal; boxes that differ by less stand in one place
 TIMES_BETTER = 10.0  # Auto leaves the world only for a fit this much better
 SUSPICIOUS = 0.05  # of the diagonal; boxes that differ by more get a warning
-# Factors between units: metric prefixes, inch, foot, yard, and their inverses.
-UNIT_FACTORS = (10.0, 100.0, 1000.0, 2.54, 25.4, 1 / 0.0254, 12.0, 1 / 0.3048, 30.48, 1 / 0.9144)
+# Factors between units: metric prefixes, inch, foot, and their inverses. No yard: artists scale by 1.1, too.
+UNIT_FACTORS = (10.0, 100.0, 1000.0, 2.54, 25.4, 1 / 0.0254, 12.0, 1 / 0.3048, 30.48)
 FACTOR_TOLERANCE = 0.01  # relative; decimation moves the box a little
 
 TURNS = (90, -90, 180)  # degrees about X; from one axis that is up to another
@@ -276,7 +276,7 @@ def _warnings(
     factor = next((factor for factor in factors if factor != 1), 1.0)
     if factor != 1:
         larger = f"{factor:.6g} times as large" if factor > 1 else f"{1 / factor:.6g} times as small"
-        return (f"{name}: it is {larger} as the reference; are the units different? Match Scale undoes that",)
+        return (f"{name}: it is {larger} as the reference; are the units different? Match Scale (--match-scale) undoes that",)
     scale = np.linalg.norm(chosen.box[1] - chosen.box[0]) / np.linalg.norm(target[1] - target[0])
     return (
         f"{name}: its box and the reference's differ by {100 * chosen.misfit:.0f} % of the diagonal (size "

@@ -423,7 +423,7 @@ def _warnings(
     if values["added"] > ADDED:
         warnings.append(
             f"{distorted}: {_percent(values['added'])} of its area lies far from the reference; the score looks around "
-            "the reference only and cannot see that (score both directions)"
+            "the reference only and cannot see that (Both Directions, --both, does)"
         )
     for name, facts in zip((reference, distorted), sides, strict=True):
         of = {fact.name: fact.value for fact in facts}

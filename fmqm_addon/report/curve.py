@@ -11,8 +11,9 @@ from html import escape
 from .picture import shorten
 
 WIDTH, HEIGHT = 460, 270
-LEFT, RIGHT, TOP, BOTTOM = 44, 16, 28, 44  # margins
+LEFT, RIGHT, TOP, BOTTOM = 44, 16, 28, 62  # margins; the lowest level's name stands above the axis' numbers
 LABEL = 22  # characters of a level's name
+LETTER, LINE = 7, 13  # about the size of a letter of a level's name
 TICKS = 3  # marks of an axis at least, where there are so many round numbers
 
 
@@ -58,22 +59,28 @@ def curve_svg(levels: Sequence[Level], cost: str) -> str:
         parts.append(f'<line class="grid" x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{y(score):.1f}" y2="{y(score):.1f}"/>')
         parts.append(f'<text x="{LEFT - 8}" y="{y(score) + 4:.1f}" text-anchor="end">{score:.2f}</text>')
     for value in _ticks(math.exp(low), math.exp(high)):
-        parts.append(f'<text x="{x(value):.1f}" y="{HEIGHT - BOTTOM + 18}" text-anchor="middle">{_short(value)}</text>')
+        parts.append(f'<text x="{x(value):.1f}" y="{HEIGHT - 26}" text-anchor="middle">{_short(value)}</text>')
     parts.append(f'<text x="{WIDTH - RIGHT}" y="{HEIGHT - 8}" text-anchor="end">{escape(cost)}</text>')
-    points = " ".join(f"{x(level.cost):.1f},{y(level.score):.1f}" for level in ordered)
-    parts.append(f'<polyline class="line" points="{points}"/>')
+    if len({level.cost for level in levels}) == len(levels):  # others are no chain
+        points = " ".join(f"{x(level.cost):.1f},{y(level.score):.1f}" for level in ordered)
+        parts.append(f'<polyline class="line" points="{points}"/>')
+    written: list[tuple[float, float, float]] = []  # left and right end, and height, of the names so far
     for level in ordered:
         # Below to the right, or above to the left: there the curve, which rises, is not.
         on_left = x(level.cost) < (LEFT + WIDTH - RIGHT) / 2
         shift, drop, anchor = (8, 17, "start") if on_left else (-7, -8, "end")
         kind = ' class="reference"' if level.is_reference else ""
-        name = escape(shorten(level.name, lambda text: len(text) <= LABEL))
         parts.append(
             f'<circle{kind} cx="{x(level.cost):.1f}" cy="{y(level.score):.1f}" r="5">'
             f"<title>{escape(level.name)}: {level.score:.4f}</title></circle>"
-            f'<text class="level" x="{x(level.cost) + shift:.1f}" y="{y(level.score) + drop:.1f}" '
-            f'text-anchor="{anchor}">{name}</text>'
         )
+        name = shorten(level.name, lambda text: len(text) <= LABEL)
+        at, height = x(level.cost) + shift, y(level.score) + drop
+        left, right = (at, at + LETTER * len(name)) if on_left else (at - LETTER * len(name), at)
+        if any(left < end and begin < right and abs(height - other) < LINE for begin, end, other in written):
+            continue  # it is told where one points at the mark
+        written.append((left, right, height))
+        parts.append(f'<text class="level" x="{at:.1f}" y="{height:.1f}" text-anchor="{anchor}">{escape(name)}</text>')
     return "".join(parts) + "</svg>"
 
 

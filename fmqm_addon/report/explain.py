@@ -29,7 +29,7 @@ _GEOMETRY = {
 }
 _COLOR = {
     "colorSSIM": "the colors have shifted or are blurred",
-    "colorGraSSIM": "edges in the texture have softened, moved or broken up",
+    "colorGraSSIM": "edges in the texture are weaker or softer, or have moved",
 }
 _SMALL = 0.01  # a feature's loss that is not worth a word
 _AXES = (("left", "right"), ("front", "back"), ("lower", "upper"))  # x, y, z; Blender's front view looks along y
@@ -102,10 +102,12 @@ def _worse(record: Mapping[str, Any]) -> str:
     attribution = record.get("attribution")
     if not geometry and not color:
         return ""
+    if not geometry and attribution is not None and attribution["mostly"] == "geometry":
+        return f"The surface is nearly as it was, but the texture does not lie on it as before: {color}."
     if not geometry:
-        return f"The geometry is as it was; {color}."
+        return f"The geometry is nearly as it was; {color}."
     if not color:
-        return f"The color is as it was; {geometry}."
+        return f"The color is nearly as it was; {geometry}."
     if attribution is None:
         return f"It is the geometry: {geometry}. The colors suffer from that, from a change of their own, or from both."
     if attribution["how"] == "nearest points":
@@ -166,8 +168,8 @@ def _fact(record: Mapping[str, Any], name: str) -> float | None:
 
 
 def _short(number: float) -> str:
-    """Two places, of which 1.00 is kept for what is exactly 1."""
-    return f"{number if number == 1 else min(number, 0.99):.2f}"
+    """Two places, or as many as tell it from 1."""
+    return f"{number:.2f}" if number == 1 or number < 0.995 else f"{min(number, 0.9999):.4f}"
 
 
 def _joined(words: Sequence[str]) -> str:

@@ -73,6 +73,13 @@ def test_nothing_lost(torus: dict[str, MeshArrays]) -> None:
     assert (nothing.geometry_loss, nothing.texture_loss, nothing.mostly) == (0, 0, "nothing")
 
 
+def test_the_texture_of_what_has_moved_far_is_as_it_was(torus: dict[str, MeshArrays]) -> None:
+    """Another place of the texture is nearest then, but the two are unwrapped alike."""
+    moved = replace(torus["reference"], positions=torus["reference"].positions + np.array([0.5, 0, 0]))
+    found = attributed(torus["reference"], moved)
+    assert (found.texture_loss, found.how) == (0, "materials") and found.geometry_loss > 0.2
+
+
 def test_a_mesh_unwrapped_anew_is_painted_from_nearest_points(torus: dict[str, MeshArrays]) -> None:
     """Its texture coordinates are shifted by half a texture, of which the same image makes another look."""
     shifted = replace(torus["reference"], corners=torus["reference"].corners + np.float32(0.5))

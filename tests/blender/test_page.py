@@ -193,13 +193,13 @@ def test_names_from_strangers_stay_text() -> None:
     shown = Page(
         record(HOSTILE, reference=HOSTILE, warnings=[HOSTILE], trust=trust, pictures=costs(10, 1 << 20)),
         record(HOSTILE, score=None, id=HOSTILE * 2, reference=HOSTILE, error=HOSTILE),
-        record("b.glb", reference=HOSTILE, pictures=costs(20, 1 << 20)),
+        record("b.glb", 0.2, reference=HOSTILE, pictures=costs(20, 1 << 20)),
     )
     harmless = Page(
         record("x/a", reference="r", warnings=["w"], trust=json.loads(json.dumps(trust).replace("<script>", "")),
                pictures=costs(10, 1 << 20)),
         record("x/a", score=None, id="aa", reference="r", error="e"),
-        record("b.glb", reference="r", pictures=costs(20, 1 << 20)),
+        record("b.glb", 0.2, reference="r", pictures=costs(20, 1 << 20)),
     )  # fmt: skip
     assert [tag for tag, _ in shown.tags] == [tag for tag, _ in harmless.tags]
     assert shown.count("script") == 1 and shown.text.count(HOSTILE) > 10
@@ -252,6 +252,15 @@ def test_the_curve_rises_with_the_costs() -> None:
     assert [circle.get("class") for circle in circles] == [None, None, "reference"]
     texts = [text.text for text in drawn.findall(f"{SVG}text")]
     assert {"b", "ref", "1.00", "0.40", "1k", "5k"} <= set(texts)
+
+
+def test_names_on_the_curve_do_not_overlap_and_only_a_chain_is_joined() -> None:
+    alike = [Level(f"pair {k}", 1000, 0.9 + 0.001 * k) for k in range(5)]
+    assert curve_svg(alike, "triangles").count('class="level"') == 1
+    assert curve_svg(alike, "triangles").count("<circle") == 5
+    assert "polyline" not in curve_svg(alike, "triangles")
+    chain = [Level(f"LOD{k}", 8000 >> k, 1 - 0.2 * k) for k in range(4)]
+    assert curve_svg(chain, "triangles").count('class="level"') == 4 and "polyline" in curve_svg(chain, "triangles")
 
 
 def test_the_page_is_written_whole_or_not_at_all(tmp_path: Path) -> None:

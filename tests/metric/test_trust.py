@@ -225,7 +225,7 @@ def test_added_geometry_is_seen_by_its_share_of_the_area() -> None:
     areas = triangle_areas(dist.vertices, dist.triangles)
     expected = areas[dist.source >= 80].sum() / areas.sum()
     assert values(trust.pair)["added"] == pytest.approx(expected, abs=1e-3) and expected > ADDED
-    assert any("cannot see" in warning and "both directions" in warning for warning in trust.warnings)
+    assert any("cannot see" in warning and "Both Directions" in warning for warning in trust.warnings)
     assert finish(added_share(ref, ref, 1e-6, seed=0, count=500)) == 0
 
 
