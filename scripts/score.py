@@ -14,8 +14,8 @@ import os
 import shutil
 import sys
 import tempfile
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, TextIO
 
@@ -32,12 +32,12 @@ from fmqm_addon.batch.sources import glob_files, lod_rows, plain_rows, read_mani
 from fmqm_addon.batch.workers import Limits, adopt, score_with_workers, workers_command
 from fmqm_addon.blender.process import FAILED, OK, WRONG_ARGUMENTS, blender_version, require_bpy, run_script
 from fmqm_addon.blender.space import SPACES
-from fmqm_addon.metric.errors import FMQMError, SettingsError, one_line
+from fmqm_addon.metric.errors import FileError, FMQMError, SettingsError
 from fmqm_addon.metric.settings import CENTERS, COLOR_SPACES, POOLINGS, PRESETS, SETTING_NAMES, Settings
 from fmqm_addon.report.explain import explain
-from fmqm_addon.report.files import check_writable, write_parts
-from fmqm_addon.report.junit import below, junit_parts
-from fmqm_addon.report.page import write_page
+from fmqm_addon.report.files import STDOUT, check_apart, check_writable, print_parts, write_parts
+from fmqm_addon.report.junit import below, junit_parts, shortfall
+from fmqm_addon.report.page import PAGE, write_page
 from fmqm_addon.report.pair import csv_parts, json_parts, table_parts, trust_parts
 from fmqm_addon.report.pair_pictures import has_pictures, open_report_folder
 
@@ -153,8 +153,8 @@ def build_parser() -> OneLineParser:
     output.add_argument(
         "--json", metavar="FILE", help="everything as JSON; - is stdout, which then carries nothing else"
     )
-    output.add_argument("--csv", metavar="FILE", help="one row a pair")
-    output.add_argument("--junit", metavar="FILE", help="one test case a pair, for build servers")
+    output.add_argument("--csv", metavar="FILE", help="one row a pair; - is stdout, as above")
+    output.add_argument("--junit", metavar="FILE", help="one test case a pair, for build servers; - as above")
     output.add_argument("--report", metavar="DIR", help="a web page with pictures: DIR/index.html")
     output.add_argument("--save-fields", metavar="FILE.npz", help="samples, fields and patch scores of the one pair")
     output.add_argument("--picture", metavar="FILE.png", help="reference, distorted and heat map of the one pair")
@@ -197,12 +197,15 @@ def main(argv: Sequence[str], out: TextIO) -> int:
             require_bpy()
             work_off(args.worker, options, limits.timeout)
             return OK
-        for path in (args.json, args.csv, args.junit, args.save_fields, args.picture, args.journal):
-            if path and path != "-":
+        rows = _rows(args, options)
+        outputs = _outputs(args)
+        named = [path for row in rows or () for path in row.files()]
+        check_apart(outputs | _page(args), [*named, args.manifest or "", *(args.merge or ())])
+        for path in outputs.values():
+            if path and path != STDOUT:
                 check_writable(path)
         if args.report:
             open_report_folder(args.report)
-        rows = _rows(args, options)
         if args.merge:
             return _merge(args, rows, out)
         return _score(args, rows or [], options, limits, argv, out)
@@ -224,8 +227,13 @@ def _check_arguments(args: argparse.Namespace) -> None:
             raise SettingsError(f"{flag.replace('_', '-')} is {limit}; it must be at least 1")
     if args.fail_under is not None and not 0 <= args.fail_under <= 1:
         raise SettingsError(f"fail-under is {args.fail_under}; it must be between 0 and 1")
-    if args.save_fields and not args.save_fields.endswith(".npz"):
-        raise SettingsError(f"--save-fields {args.save_fields}: the file must end in .npz")
+    for flag, ending in (("save_fields", ".npz"), ("picture", ".png")):
+        path = getattr(args, flag)
+        if path and not path.endswith(ending):
+            raise SettingsError(f"{_flag(flag)} {path}: the file must end in {ending}")
+    for flag in ("journal", "report"):
+        if getattr(args, flag) == STDOUT:
+            raise SettingsError(f"{_flag(flag)} -: only --json, --csv and --junit can go to stdout; name a path")
     _check_sources(args)
     for flag, least in (("jobs", 1), ("timeout", 0), ("memory_limit", 0)):
         value = getattr(args, flag)
@@ -242,7 +250,7 @@ def _check_arguments(args: argparse.Namespace) -> None:
         raise SettingsError("--resume needs --journal, or an output file beside which the journal is")
     if args.shard:
         _shard(args.shard)
-    scoring = ("jobs", "dask", "resume", "save_fields", "picture", "both", "attribution")
+    scoring = ("jobs", "dask", "resume", "shard", "save_fields", "picture", "both", "attribution")
     ignored = [flag for flag in scoring if args.merge and getattr(args, flag)]
     if ignored:
         raise SettingsError(f"--merge scores nothing; leave out {_flag(ignored)}")
@@ -300,17 +308,28 @@ def _rows(args: argparse.Namespace, options: Options) -> list[Row] | None:
     return rows
 
 
+def _outputs(args: argparse.Namespace) -> dict[str, str | None]:
+    """Files that are written, by flag, the report aside."""
+    names = ("json", "csv", "junit", "save_fields", "picture")
+    journal = None if args.merge else _journal_path(args)
+    return {_flag(name): getattr(args, name) for name in names} | {"--journal": journal}
+
+
+def _page(args: argparse.Namespace) -> dict[str, str | None]:
+    return {"--report": args.report and os.path.join(args.report, PAGE)}
+
+
 def _journal_path(args: argparse.Namespace) -> str | None:
     """Beside the first output file, unless it is named; None where there is neither."""
     if args.journal:
         return str(args.journal)
-    first = next((path for path in (args.json, args.csv, args.junit) if path and path != "-"), None)
+    first = next((path for path in (args.json, args.csv, args.junit) if path and path != STDOUT), None)
     return f"{first}.journal.jsonl" if first else None
 
 
 def _merge(args: argparse.Namespace, rows: list[Row] | None, out: TextIO) -> int:
     merged = Merged(args.merge, rows, Log(PROGRAM, 1, 1), args.fail_under)
-    _write(args, merged, merged.settings, merged.versions, out)
+    _write(args, merged, merged.settings, merged.versions, None, out)
     return _exit_code(merged)
 
 
@@ -331,7 +350,7 @@ def _score(
         waiting = {
             key: Task(key, row)
             for key, row in zip(keys, rows, strict=True)
-            if key not in journal or not has_pictures(args.report, journal.record(key))
+            if not journal.has_scores(key) or not has_pictures(args.report, journal.record(key))
         }
         tasks = list(waiting.values())
         try:
@@ -341,20 +360,10 @@ def _score(
                 print(f"{PROGRAM}: interrupted; --resume goes on where {path} ends", file=sys.stderr)
             raise
     records = Records(rows, keys, journal, args.fail_under)
-    _say_warnings(records)
-    _write(args, records, options.as_dict(), versions, out)
+    _write(args, records, options.as_dict(), versions, last, out)
     code = _exit_code(records)
     batch = args.manifest or args.glob or args.lods or args.jobs or args.dask or args.journal or args.resume
     journal.close() if batch else journal.remove()
-    if last is not None:
-        from fmqm_addon.report.fields import save_fields
-        from fmqm_addon.report.picture import write_picture
-
-        result = last.comparison.result
-        if args.save_fields:
-            save_fields(args.save_fields, result)
-        if args.picture:
-            write_picture(args.picture, last.reference, last.comparison.distorted, result)
     return code
 
 
@@ -369,10 +378,8 @@ def _score_tasks(
 ) -> Answer | None:
     """On the cluster, by workers, or here: then what came of the last pair."""
     if args.dask:
-        tasks = [replace(task, row=replace(task.row, folder=os.path.abspath(task.row.folder))) for task in tasks]
         score_on_cluster(tasks, args.dask, argv, limits, journal, Log(PROGRAM, len(tasks), len(tasks), args.quiet))
     elif args.jobs:
-        folder.mkdir(exist_ok=True)
         log = Log(PROGRAM, len(tasks), len(tasks), args.quiet)
         command = workers_command(str(Path(__file__).resolve()), argv)
         score_with_workers(tasks, command, folder, args.jobs, limits, journal, log)
@@ -386,7 +393,10 @@ def _score_tasks(
 @contextlib.contextmanager
 def _folder_of_workers(journal: str | None) -> Iterator[Path]:
     """Beside the journal, so that a run that was killed leaves it to the next one."""
-    folder = Path(f"{journal}.workers" if journal else tempfile.mkdtemp(prefix="fmqm-"))
+    try:
+        folder = Path(f"{journal}.workers" if journal else tempfile.mkdtemp(prefix="fmqm-"))
+    except OSError as error:
+        raise FileError(f"{tempfile.gettempdir()}: no folder can be made ({error.strerror or error})") from error
     try:
         yield folder
     finally:
@@ -398,36 +408,74 @@ def _write(
     records: Iterable[Mapping[str, Any]],
     settings: Mapping[str, Any],
     versions: Mapping[str, str],
+    last: Answer | None,
     out: TextIO,
 ) -> None:
-    if args.json == "-":
-        out.writelines(json_parts(records, settings, versions))
-    else:
-        out.writelines(table_parts(records))
-        if args.verbose:
-            out.writelines(trust_parts(records))
-        if args.explain:
+    """What is to be known before the scores are believed, then the files, and in any case what is printed."""
+    _say_remarks(records)
+    head = dict(versions) | ({"shard": _shard(args.shard)} if args.shard else {})
+    texts = [
+        (args.json, json_parts(records, settings, head)),
+        (args.csv, csv_parts(records)),
+        (args.junit, junit_parts(records)),
+    ]
+    try:
+        check_apart(_outputs(args) | _page(args), _images(records))
+        for path, parts in texts:
+            if path and path != STDOUT:
+                write_parts(path, parts)
+        if args.report:
+            write_page(args.report, records, settings, versions)
+        if last is not None:
+            _write_last(args, last)
+    finally:
+        alone = next((parts for path, parts in texts if path == STDOUT), None)
+        print_parts(out, _table_parts(args, records) if alone is None else alone)
+
+
+def _write_last(args: argparse.Namespace, last: Answer) -> None:
+    from fmqm_addon.report.fields import save_fields
+    from fmqm_addon.report.picture import write_picture
+
+    result = last.comparison.result
+    if args.save_fields:
+        save_fields(args.save_fields, result)
+    if args.picture:
+        write_picture(args.picture, last.reference, last.comparison.distorted, result)
+
+
+def _table_parts(args: argparse.Namespace, records: Iterable[Mapping[str, Any]]) -> Iterator[str]:
+    yield from table_parts(records)
+    if args.verbose:
+        yield from trust_parts(records)
+    if args.explain:
+        for record in records:
             # A pair without scores of its own process, such as a lost one, comes without an explanation.
-            out.writelines(f"\n{record.get('explanation') or explain(record)}\n" for record in records)
-        if args.json:
-            write_parts(args.json, json_parts(records, settings, versions))
-    if args.csv:
-        write_parts(args.csv, csv_parts(records))
-    if args.junit:
-        write_parts(args.junit, junit_parts(records))
-    if args.report:
-        write_page(args.report, records, settings, versions)
-    out.flush()
+            yield f"\n{record.get('explanation') or explain(record)}\n"
 
 
-def _say_warnings(records: Iterable[Mapping[str, Any]]) -> None:
-    """Each once."""
-    said: set[int] = set()
+def _images(records: Iterable[Mapping[str, Any]]) -> Iterator[str]:
+    """Paths of the images that the colors came from."""
+    for trust in (record["trust"] for record in records):
+        for name in ("reference", "distorted") if trust else ():
+            yield from (image["path"] for image in trust[name]["images"]["value"] or ())
+
+
+def _say_remarks(records: Iterable[Mapping[str, Any]]) -> None:
+    """Each warning once, with the pair where it came first; each pair that is below its threshold."""
+    pairs = 0
+    times: Counter[int] = Counter()
+    for record in records:
+        pairs += 1
+        times.update({hash(warning) for warning in record["warnings"]})
+    log = Log(PROGRAM, pairs, pairs)
     for record in records:
         for warning in record["warnings"]:
-            if hash(warning) not in said:
-                said.add(hash(warning))
-                print(f"{PROGRAM}: warning: {one_line(warning)}", file=sys.stderr)
+            if others := times.pop(hash(warning), 0):
+                name = record["id"] if others == 1 else f"{record['id']} and {others - 1} more"
+                log.say(warning, name, "warning: ")
+        if below(record):
+            log.say(f"{record['id']}: {shortfall(record)}")
 
 
 def _exit_code(records: Iterable[Mapping[str, Any]]) -> int:

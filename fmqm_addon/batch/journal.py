@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What has been scored, on disk as it comes: one line of JSON for each event, each forced to the disk.
 
-{"start": key} before a pair, {"done": key, "pair": record} after it; "lost": true where a pair ended its worker.
+{"start": key} before a pair, {"done": key, "pair": record} after it. Of two records of one pair the last counts.
 """
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
@@ -19,9 +20,11 @@ try:
 except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
-from ..blender.spec import split_spec
-from ..metric.errors import FileError
+from ..metric.errors import FileError, SettingsError
+from ..report.pair import RECORD_KEYS
 from .rows import Options, Row
+
+_BEGINNINGS = (b'{"start": "', b'{"done": "')  # of a line
 
 
 def row_key(row: Row, options: Options, versions: Mapping[str, str]) -> str:
@@ -30,8 +33,7 @@ def row_key(row: Row, options: Options, versions: Mapping[str, str]) -> str:
     Its id and threshold are not part of it: they can change without a new score.
     """
     told = asdict(row) | {"folder": os.path.abspath(row.folder), "id": None, "fail_under": None}
-    files = [split_spec(row.path(name))[0] for name in (row.reference, row.distorted)]
-    stamps = [_stamp(path) for path in (*files, row.path(row.ref_texture), row.path(row.texture))]
+    stamps = [_stamp(path) for path in row.files()]
     text = json.dumps([told, options.as_dict(), dict(versions), stamps], sort_keys=True)
     return hashlib.blake2b(text.encode("utf-8", "surrogatepass"), digest_size=16).hexdigest()
 
@@ -52,38 +54,41 @@ class Journal:
         resume: go on with what the file holds, less a last line that was torn; else it is replaced.
 
     Raises:
-        FileError: it cannot be written.
+        FileError: it cannot be written. SettingsError: the file is something else, which is left as it is.
     """
 
     def __init__(self, path: str | None = None, resume: bool = False) -> None:
         self.path = path
         self._offsets: dict[str, int] = {}
-        self._lost: set[str] = set()
+        self._failed: set[str] = set()
         try:
             self._file: IO[bytes] = open(path, "ab+", 0) if path else tempfile.TemporaryFile(buffering=0)  # noqa: SIM115
             _lock(self._file, path)
+            if self._is_foreign():
+                raise SettingsError(f"{path}: this file is not a journal; name another with --journal")
             if not resume:
                 self._file.truncate(0)
-            self._file.seek(0)
             self._read()
         except OSError as error:
-            raise FileError(f"{path}: the journal cannot be written ({error.strerror})") from error
+            raise self._cannot_be_written(error) from error
 
     def __contains__(self, key: object) -> bool:
-        """Whether there is a record to stand by: a pair that ended its worker is worth another run."""
-        return key in self._offsets and key not in self._lost
+        """Whether there is a record, of scores or of an error."""
+        return key in self._offsets
+
+    def has_scores(self, key: str) -> bool:
+        """Whether there is a record to stand by: the cause of an error may have been repaired."""
+        return key in self._offsets and key not in self._failed
 
     def start(self, key: str) -> None:
         self._append({"start": key})
 
-    def done(self, key: str, record: Mapping[str, Any], lost: bool = False) -> None:
-        end = self._append({"done": key, **({"lost": True} if lost else {}), "pair": record})
-        self._note(key, end, lost)
+    def done(self, key: str, record: Mapping[str, Any]) -> None:
+        self._note(key, self._append({"done": key, "pair": record}), record)
 
     def record(self, key: str) -> dict[str, Any]:
         """Raises KeyError if there is none."""
-        self._file.seek(self._offsets[key])
-        with os.fdopen(os.dup(self._file.fileno()), "rb") as reader:
+        with self._reader(self._offsets[key]) as reader:
             pair: dict[str, Any] = json.loads(reader.readline())["pair"]
         return pair
 
@@ -95,35 +100,55 @@ class Journal:
         if self.path:
             os.remove(self.path)
 
+    def _is_foreign(self) -> bool:
+        """Whether it holds something, but no event."""
+        with self._reader() as reader:
+            first = reader.readline()
+            return not any(begin.startswith(first[: len(begin)]) for begin in _BEGINNINGS) and not any(
+                map(parse_line, reader)
+            )
+
     def _read(self) -> None:
         offset = 0
-        with os.fdopen(os.dup(self._file.fileno()), "rb") as reader:
+        with self._reader() as reader:
             for line in reader:
                 if not line.endswith(b"\n"):
                     self._file.truncate(offset)
                     break
                 event = parse_line(line)
                 if "done" in event:
-                    self._note(event["done"], offset, "lost" in event)
+                    self._note(event["done"], offset, event["pair"])
                 offset += len(line)
 
-    def _note(self, key: str, offset: int, lost: bool) -> None:
+    def _reader(self, offset: int = 0) -> IO[bytes]:
+        self._file.seek(offset)
+        return os.fdopen(os.dup(self._file.fileno()), "rb")
+
+    def _note(self, key: str, offset: int, record: Mapping[str, Any]) -> None:
         self._offsets[key] = offset
-        if lost:
-            self._lost.add(key)
+        if record["error"] is None:
+            self._failed.discard(key)
         else:
-            self._lost.discard(key)
+            self._failed.add(key)
 
     def _append(self, event: Mapping[str, Any]) -> int:
         """Where the line begins. Written in one piece: a reader never sees the middle of two."""
+        rest = memoryview(json.dumps(event, allow_nan=False).encode() + b"\n")
+        begin = self._file.seek(0, os.SEEK_END)
         try:
-            begin = self._file.seek(0, os.SEEK_END)
-            self._file.write(json.dumps(event, allow_nan=False).encode() + b"\n")
+            while rest:  # a disk that fills up takes a part first, and only then says so
+                rest = rest[self._file.write(rest) :]
             if self.path:
                 os.fsync(self._file.fileno())
         except OSError as error:
-            raise FileError(f"{self.path}: the journal cannot be written ({error.strerror})") from error
+            with contextlib.suppress(OSError):
+                self._file.truncate(begin)
+            raise self._cannot_be_written(error) from error
         return begin
+
+    def _cannot_be_written(self, error: OSError) -> FileError:
+        where = self.path or tempfile.gettempdir()
+        return FileError(f"{where}: the journal cannot be written ({error.strerror or error})")
 
 
 def _lock(file: IO[bytes], path: str | None) -> None:
@@ -139,12 +164,17 @@ def _lock(file: IO[bytes], path: str | None) -> None:
 
 
 def parse_line(line: bytes) -> dict[str, Any]:
-    """An event; {} where a power cut left something else."""
+    """An event; {} where a power cut or an editor left something else."""
     try:
         event = json.loads(line)
-    except ValueError:
+    except (ValueError, RecursionError):
         return {}
-    return event if isinstance(event, dict) else {}
+    match event:
+        case {"start": str(), **rest} if not rest:
+            return {"start": event["start"]}
+        case {"done": str(), "pair": dict() as pair} if pair.keys() >= RECORD_KEYS:
+            return {"done": event["done"], "pair": pair}
+    return {}
 
 
 class Records:
@@ -159,5 +189,4 @@ class Records:
     def __iter__(self) -> Iterator[dict[str, Any]]:
         for row, key in zip(self._rows, self._keys, strict=True):
             limit = self._fail_under if row.fail_under is None else row.fail_under
-            own = {name: str(value) if value == float("inf") else value for name, value in row.settings}
-            yield self._journal.record(key) | {"id": row.id, "settings": own, "fail_under": limit}
+            yield self._journal.record(key) | row.told() | {"fail_under": limit}

@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 import time
 from collections.abc import Mapping
 from typing import Any
 
-from ..metric.errors import one_line
+from ..metric.errors import FileError, one_line
+from ..report.files import print_parts
 
 
 class Log:
@@ -38,22 +40,27 @@ class Log:
             return
         self._percent = percent
         line = f"{percent:3d} %  {one_line(text)}{self._rate()}"
-        if self._moving:
-            print(f"\r\x1b[K{line}", end="", file=sys.stderr, flush=True)
-        else:
-            print(line, file=sys.stderr, flush=True)
+        _print(f"\r\x1b[K{line}" if self._moving else f"{line}\n")
 
     def scored(self, record: Mapping[str, Any]) -> None:
         """Counts a pair that was scored elsewhere as a unit."""
         self.finished += 1
         if record["error"] is not None:
-            self.say(record["error"])
+            self.say(record["error"], record["id"])
         self.show(self.finished, f"scored {record['id']}")
 
-    def say(self, text: str) -> None:
+    def say(self, text: str, name: str = "", kind: str = "") -> None:
+        """Says it at once.
+
+        Args:
+            name: id of the pair that it is about, which is said where there are several.
+            kind: comes first, such as "warning: ".
+        """
+        if self._pairs > 1 and name and not text.startswith(f"{name}: "):
+            text = f"{name}: {text}"
         if not self._silent:
             self.end()
-            print(f"{self._program}: {one_line(text)}", file=sys.stderr, flush=True)
+            _print(f"{self._program}: {kind}{one_line(text)}\n")
 
     def note(self, text: str) -> None:
         """What is good to know, but no error."""
@@ -63,7 +70,7 @@ class Log:
     def end(self) -> None:
         """Clears the moving line."""
         if self._moving and not self._quiet:
-            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+            _print("\r\x1b[K")
 
     def _rate(self) -> str:
         spent = time.monotonic() - self._began
@@ -71,6 +78,11 @@ class Log:
             return ""
         left = spent / self.finished * (self._pairs - self.finished)
         return f"; {self.finished} of {self._pairs}, {_pace(self.finished / spent)}, {_duration(left)} left"
+
+
+def _print(text: str) -> None:
+    with contextlib.suppress(FileError):  # the work goes on though nobody can be told
+        print_parts(sys.stderr, [text])
 
 
 def _pace(pairs_a_second: float) -> str:

@@ -4,16 +4,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from ..metric.errors import FileError
-from ..report.pair import PairScore, pair_record
+from ..report.pair import RECORD_KEYS
 from .journal import Journal
 from .log import Log
 from .rows import Row
 
-_KEYS = {*pair_record(PairScore("", "")), "fail_under"}
+_KEYS = RECORD_KEYS | {"settings", "fail_under"}
 _SHARED = ("fmqm_version", "blender_version", "settings")  # what all parts must agree on
 
 
@@ -21,7 +21,8 @@ class Merged:
     """The records of several JSON outputs, by id.
 
     Args:
-        rows: give the order, and which there should be; None takes the parts as they are.
+        rows: give the order, and which there should be. None takes what the parts have: in the order of the whole,
+            where they know which shards they are.
         log: is told of ids that are there twice (the first counts), missing, or not among the rows.
         fail_under: of pairs whose row has none; None leaves those of the parts.
 
@@ -29,7 +30,8 @@ class Merged:
         settings, versions: as json_parts wants them.
 
     Raises:
-        FileError: a part is not such an output, or was scored at other settings or by another version.
+        FileError: a part is not such an output, or was scored at other settings or by another version, or there are
+            no rows and a shard is missing.
     """
 
     def __init__(
@@ -39,6 +41,9 @@ class Merged:
         self._fail_under = fail_under
         self._rows = {row.id: row for row in rows or ()}
         self._ids: list[str] = []
+        self._others: dict[str, str] = {}  # why a record of this id is not that of its row
+        places: dict[str, int] = {}  # in the whole, by id
+        shards: set[tuple[int, int]] = set()
         first: dict[str, Any] = {}
         for path in paths:
             part = _read(path)
@@ -46,15 +51,24 @@ class Merged:
             for name in _SHARED:
                 if part[name] != first[name]:
                     raise FileError(f"{path}: its {name} differ from those in {paths[0]}; scores do not compare")
-            for record in part["pairs"]:
+            number, count = part.get("shard") or (0, 0)
+            shards.add((number, count))
+            for index, record in enumerate(part["pairs"]):
+                places.setdefault(record["id"], number + index * count)
                 self._add(record, path, log)
         self.settings: dict[str, Any] = first["settings"]
         self.versions = {name: first[name] for name in _SHARED[:2]}
         if rows is not None:
-            missing = [row.id for row in rows if row.id not in self._journal]
-            for name in missing:
-                log.say(f"{name}: none of the parts has it")
+            for row in rows:
+                if row.id not in self._journal:
+                    log.say(self._gap(row))
             self._ids = [row.id for row in rows]
+        elif len({count for _, count in shards}) == 1:
+            missing = {(number, count) for _, count in shards for number in range(1, count + 1)} - shards
+            if missing:
+                names = ", ".join(f"{number}/{count}" for number, count in sorted(missing))
+                raise FileError(f"--merge: shard {names} is missing; add it, or give the --manifest to go without")
+            self._ids.sort(key=places.__getitem__)
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
         for name in self._ids:
@@ -64,8 +78,11 @@ class Merged:
                 record = self._journal.record(name)
                 yield record if limit is None else record | {"fail_under": limit}
             elif row is not None:
-                gap = PairScore(row.reference, row.distorted, error=f"{name}: none of the merged parts has it")
-                yield pair_record(gap) | {"id": name, "settings": dict(row.settings), "fail_under": limit}
+                yield row.failed(self._gap(row)) | {"fail_under": limit}
+
+    def _gap(self, row: Row) -> str:
+        """Why there is no record."""
+        return f"{row.id}: {self._others.get(row.id, 'none of the merged parts has it')}"
 
     def _add(self, record: dict[str, Any], path: str, log: Log) -> None:
         name = record["id"]
@@ -73,9 +90,19 @@ class Merged:
             log.say(f"{path}: {name} is there twice; the first counts")
         elif self._rows and name not in self._rows:
             log.say(f"{path}: {name} is not in the manifest; it is left out")
+        elif name in self._rows and (difference := _difference(record, self._rows[name])):
+            self._others[name] = f"{path} has it with {difference}; score it anew"
         else:
             self._journal.done(name, record)
             self._ids.append(name)
+
+
+def _difference(record: Mapping[str, Any], row: Row) -> str:
+    """What was scored otherwise than the row wants it; "" for nothing."""
+    for name, wanted in row.told().items():
+        if (scored := record.get(name)) != wanted:
+            return f"{name} {scored or 'none'} instead of {wanted or 'none'}"
+    return ""
 
 
 def _read(path: str) -> dict[str, Any]:
@@ -83,6 +110,9 @@ def _read(path: str) -> dict[str, Any]:
         with open(path, encoding="utf-8") as file:
             part = json.load(file)
         wanted = {*_SHARED, "pairs"} <= set(part) and all(set(pair) >= _KEYS for pair in part["pairs"])
+        if "shard" in part:
+            number, count = map(int, part["shard"])
+            wanted = wanted and 1 <= number <= count
     except OSError as error:
         raise FileError(f"{path}: cannot be read ({error.strerror})") from error
     except (ValueError, TypeError, RecursionError):

@@ -8,7 +8,9 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+from ..blender.spec import split_spec
 from ..metric.settings import Settings
+from ..report.pair import PairScore, pair_record
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,21 @@ class Row:
     def path(self, name: str) -> str:
         """Where a named file is, from the working directory; "" stays ""."""
         return os.path.join(self.folder, name) if name else ""
+
+    def files(self) -> list[str]:
+        """Where the assets and textures are that it names, from the working directory; "" for no texture."""
+        assets = [split_spec(self.path(name))[0] for name in (self.reference, self.distorted)]
+        return [*assets, self.path(self.ref_texture), self.path(self.texture)]
+
+    def told(self) -> dict[str, Any]:
+        """What a record tells of it, as JSON has it."""
+        own = {name: str(value) if value == float("inf") else value for name, value in self.settings}
+        textures = {"ref_texture": self.ref_texture or None, "texture": self.texture or None}
+        return {"id": self.id, "reference": self.reference, "distorted": self.distorted, **textures, "settings": own}
+
+    def failed(self, why: str) -> dict[str, Any]:
+        """The record of a row that was not scored."""
+        return pair_record(PairScore(self.reference, self.distorted, error=why)) | self.told()
 
     @property
     def preparation(self) -> tuple[Any, ...]:

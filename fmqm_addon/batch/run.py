@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..blender.process import stops_wait
-from ..metric.errors import FMQMError, OutputError
+from ..metric.errors import FMQMError, OutputError, one_line
 from ..report.explain import explain, where
 from ..report.pair import PairScore, pair_record
 from ..report.pair_pictures import picture_stem, write_pair_pictures
@@ -80,31 +80,34 @@ class _Scorer:
         asked = _question(self._options, row)
         self._begin(group[0])
         began = time.perf_counter()
-        failure: FMQMError | None = None
+        failure = ""
         try:
             reference = self._load(row, row.reference, row.ref_texture)
             self._tell_memory(reference, asked)
             measurement = measurement_of(reference, asked)
             self._work(measurement.prepare(), "preparing the reference")
-        except FMQMError as error:
-            failure = error
+        except Exception as error:
+            failure = _told(error, row.reference)
         self._units += 1
         for task in group:
             if task is not group[0]:
                 self._begin(task)
             pair = PairScore(task.row.reference, task.row.distorted)
             self.last = None
-            try:
-                if failure is not None:
-                    raise failure
-                pair = self._compare(pair, task.row, reference, measurement)
-            except OutputError:
-                raise
-            except FMQMError as error:
-                pair = replace(pair, error=str(error))
-                self._log.say(str(error))
+            why = failure
+            if not failure:
+                try:
+                    pair = self._compare(pair, task.row, reference, measurement)
+                except OutputError:
+                    raise
+                except Exception as error:
+                    why = _told(error, task.row.distorted)
+            if why:
+                pair = replace(pair, error=why)
+                self._log.say(why, task.row.id)
             now = time.perf_counter()
             record = pair_record(replace(pair, seconds={**self._seconds, "total": now - began}))
+            record["id"] = task.row.id
             if self._options.explain:
                 record["explanation"] = explain(record)
             self._journal.done(task.key, record)
@@ -186,6 +189,14 @@ class _Scorer:
 
     def _spent(self, stage: str, seconds: float) -> None:
         self._seconds[stage] = self._seconds.get(stage, 0.0) + seconds
+
+
+def _told(error: Exception, name: str) -> str:
+    """Why there are no scores; what nobody has foreseen is no reason to leave the other pairs alone."""
+    if isinstance(error, FMQMError):
+        return str(error)
+    kind = MemoryError if isinstance(error, MemoryError) else type(error)  # numpy has one of its own
+    return one_line(f"{name}: {kind.__name__}: {error}")
 
 
 def _question(options: Options, row: Row) -> Question:

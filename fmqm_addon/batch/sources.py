@@ -84,17 +84,21 @@ def read_manifest(path: str, settings: Settings) -> list[Row]:
         settings: what a row's own settings are changes of.
 
     Raises:
-        FileError: it cannot be read. SettingsError: a column or value is wrong; the text names the row.
+        FileError: it cannot be read. SettingsError: what it holds is wrong; the text names the row.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in (".csv", ".json"):
-        raise FileError(f"{path}: a manifest must end in .csv or .json")
+        raise SettingsError(f"{path}: a manifest must end in .csv or .json")
     try:
         plain = _csv_rows(path) if suffix == ".csv" else _json_rows(path)
     except OSError as error:
         raise FileError(f"{path}: cannot be read ({error.strerror})") from error
-    except (ValueError, csv.Error, RecursionError) as error:  # json raises ValueError for numbers too long for int
-        raise FileError(f"{path}: not a {suffix[1:].upper()} file in UTF-8 ({error})") from error
+    except UnicodeDecodeError as error:
+        raise FileError(f'{path}: not in UTF-8; save it so (a spreadsheet\'s "CSV UTF-8")') from error
+    except csv.Error as error:
+        raise FileError(f"{path}: not a CSV file ({error}; are all quotes closed?)") from error
+    except (ValueError, RecursionError) as error:  # json raises ValueError for numbers too long for int
+        raise FileError(f"{path}: not a JSON file ({error})") from error
     rows, taken = [], dict[str, int]()
     for number, values in plain:
         try:
@@ -106,14 +110,20 @@ def read_manifest(path: str, settings: Settings) -> list[Row]:
         taken[row.id] = number
         rows.append(row)
     if not rows:
-        raise FileError(f"{path}: no rows in it; one for each pair is wanted")
+        raise SettingsError(f"{path}: no rows in it; one for each pair is wanted")
     return _with_ids(rows)
 
 
 def _csv_rows(path: str) -> list[tuple[int, dict[str, Any]]]:
     with open(path, encoding="utf-8-sig", newline="") as file:
-        reader = csv.DictReader(file, restkey="", skipinitialspace=True)
-        rows = [(reader.line_num, row) for row in reader]
+        header = file.readline()
+        # Spreadsheets write what the country uses where a comma is the decimal point.
+        delimiter = next((each for each in ",;\t" if each in header), ",")
+        names = next(csv.reader([header], delimiter=delimiter, skipinitialspace=True), [])
+        reader = csv.DictReader(
+            file, [name.strip() for name in names], "", "", delimiter=delimiter, skipinitialspace=True, strict=True
+        )
+        rows = [(1 + reader.line_num, row) for row in reader if any("".join(value) for value in row.values())]
         _check_columns(path, reader.fieldnames or ())
     for number, row in rows:
         if "" in row:
@@ -125,7 +135,7 @@ def _json_rows(path: str) -> list[tuple[int, dict[str, Any]]]:
     with open(path, encoding="utf-8-sig") as file:
         rows = json.load(file)
     if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
-        raise FileError(f"{path}: a list of objects is wanted, one for each pair")
+        raise SettingsError(f"{path}: a list of objects is wanted, one for each pair")
     _check_columns(path, dict.fromkeys(name for row in rows for name in row))
     return list(enumerate(rows, 1))
 

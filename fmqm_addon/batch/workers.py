@@ -24,8 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from ..blender.process import stops_wait
-from ..metric.errors import FMQMError
-from ..report.pair import PairScore, pair_record
+from ..metric.errors import FileError, FMQMError
 from .journal import Journal, parse_line
 from .log import Log
 from .rows import Task, grouped
@@ -58,6 +57,7 @@ def score_with_workers(
     limits: Limits,
     journal: Journal,
     log: Log,
+    cwd: str | None = None,
 ) -> None:
     """Scores all tasks into the journal.
 
@@ -65,13 +65,14 @@ def score_with_workers(
         command: a worker's, to which the path of a shard is added.
         folder: for shards and the workers' journals and temporary files.
         log: counts the pairs.
+        cwd: the workers' working directory; None is that of this process.
 
     Raises:
-        FMQMError: workers end before they score anything, or their memory cannot be watched.
+        FMQMError: workers end before they score anything, cannot be started, or their memory cannot be watched.
     """
     if limits.memory is not None and resident_bytes(os.getpid()) is None:
         raise FMQMError("--memory-limit: neither /proc nor ps tells the memory of a process here; leave it out")
-    pool = _Pool(tasks, command, folder, limits, journal, log)
+    pool = _Pool(tasks, command, folder, limits, journal, log, cwd)
     try:
         while pool.waiting or pool.workers:
             with stops_wait():  # a stop inside of Popen.poll would leave its lock closed, and Popen.wait waiting
@@ -83,10 +84,10 @@ def score_with_workers(
 
 
 def adopt(folder: Path, journal: Journal) -> None:
-    """Takes over what workers wrote whose parent was killed before it read it, and removes their folder."""
+    """Takes over the scores of workers whose parent was killed before it read them, and removes their folder."""
     for path in sorted(folder.glob("shard-*.jsonl")):
         for event in map(parse_line, path.read_bytes().splitlines()):
-            if "done" in event and event["done"] not in journal:
+            if "done" in event and event["pair"]["error"] is None and not journal.has_scores(event["done"]):
                 journal.done(event["done"], event["pair"])
     shutil.rmtree(folder, ignore_errors=True)
 
@@ -95,7 +96,14 @@ class _Pool:
     """The tasks that wait and the workers that are at it."""
 
     def __init__(
-        self, tasks: Sequence[Task], command: Sequence[str], folder: Path, limits: Limits, journal: Journal, log: Log
+        self,
+        tasks: Sequence[Task],
+        command: Sequence[str],
+        folder: Path,
+        limits: Limits,
+        journal: Journal,
+        log: Log,
+        cwd: str | None,
     ) -> None:
         self.waiting = deque(task for group in grouped(tasks) for task in group)
         self.workers: list[_Worker] = []
@@ -104,6 +112,7 @@ class _Pool:
         self._limits = limits
         self._journal = journal
         self._log = log
+        self._cwd = cwd
         self._failed: Counter[str] = Counter()  # tries, by key
         self._began = time.monotonic()
         self._started = 0  # workers
@@ -114,7 +123,8 @@ class _Pool:
         while self.waiting and len(self.workers) < jobs:
             share = [self.waiting.popleft() for _ in range(self._share(jobs))]
             self._started += 1
-            self.workers.append(_Worker(self._command, self._folder / f"shard-{self._started}.json", share))
+            shard = self._folder / f"shard-{self._started}.json"
+            self.workers.append(_Worker(self._command, shard, share, self._cwd))
         for worker in list(self.workers):
             self._take_news(worker)  # first, since this process may have stood still for long, and the worker not
             trouble = worker.trouble(self._limits)
@@ -145,9 +155,9 @@ class _Pool:
             elif "done" in event:
                 self._finish(event["done"], event["pair"])
 
-    def _finish(self, key: str, record: Mapping[str, Any], lost: bool = False) -> None:
+    def _finish(self, key: str, record: Mapping[str, Any]) -> None:
         self._barren = 0
-        self._journal.done(key, record, lost)
+        self._journal.done(key, record)
         self._log.scored(record)
 
     def _bury(self, worker: _Worker, trouble: str) -> None:
@@ -168,11 +178,10 @@ class _Pool:
         self._failed[failed.key] += 1
         name = failed.row.distorted
         if self._failed[failed.key] < TRIES:
-            self._log.say(f"{name}: {why}; it will be tried once more")
+            self._log.say(f"{name}: {why}; it will be tried once more", failed.row.id)
             self.waiting.append(failed)
         else:
-            lost = PairScore(failed.row.reference, name, error=f"{name}: {why}, {TRIES} times; look at it alone")
-            self._finish(failed.key, pair_record(lost), lost=True)
+            self._finish(failed.key, failed.row.failed(f"{name}: {why}, {TRIES} times; look at it alone"))
 
 
 class _Worker:
@@ -182,26 +191,31 @@ class _Worker:
         tasks: those it has not done, by key. at: key of the one it is at, "" before the first and between two.
     """
 
-    def __init__(self, command: Sequence[str], shard: Path, tasks: Sequence[Task]) -> None:
+    def __init__(self, command: Sequence[str], shard: Path, tasks: Sequence[Task], cwd: str | None) -> None:
         self.tasks = {task.key: task for task in tasks}
         self.at = ""
         self._shard = shard
         self._read = 0  # bytes of its journal
         self._heard = time.monotonic()
-        # A run that was killed may have left one of the same name, which would be read as this worker's.
-        Path(journal_of(str(shard))).unlink(missing_ok=True)
-        shard.write_text(json.dumps([task.as_dict() for task in tasks]), encoding="utf-8")
-        with open(shard.with_suffix(".log"), "wb") as log:
-            # Its input is a pipe that nothing is written to: it closes when this process ends, however it does.
-            # In a session of its own, Ctrl-C reaches only this process, which ends it.
-            self._process = subprocess.Popen(
-                [*command, str(shard)],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.DEVNULL,
-                stderr=log,
-                env=os.environ | dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(shard.parent.resolve())),
-                start_new_session=True,
-            )
+        try:
+            shard.parent.mkdir(exist_ok=True)
+            # A run that was killed may have left one of the same name, which would be read as this worker's.
+            Path(journal_of(str(shard))).unlink(missing_ok=True)
+            shard.write_text(json.dumps([task.as_dict() for task in tasks]), encoding="utf-8")
+            with open(shard.with_suffix(".log"), "wb") as log:
+                # Its input is a pipe that nothing is written to: it closes when this process ends, however it does.
+                # In a session of its own, Ctrl-C reaches only this process, which ends it.
+                self._process = subprocess.Popen(
+                    [*command, str(shard)],
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.DEVNULL,
+                    stderr=log,
+                    cwd=cwd,
+                    env=os.environ | dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(shard.parent.resolve())),
+                    start_new_session=True,
+                )
+        except OSError as error:
+            raise FileError(f"{shard}: a worker cannot be started ({error.strerror or error})") from error
 
     @property
     def ended(self) -> bool:
@@ -242,11 +256,11 @@ class _Worker:
             self._process.stdin.close()
 
     def farewell(self) -> str:
-        """How it ended by itself."""
+        """How it ended by itself, and what it said last."""
         code = self._process.returncode
-        if code >= 0:
-            return f"its worker ended with exit code {code}"
-        return f"its worker died ({signal.Signals(-code).name})"
+        how = f"ended with exit code {code}" if code >= 0 else f"died ({signal.Signals(-code).name})"
+        words = self.last_words()
+        return f"its worker {how}{f', saying: {words}' if words else ''}"
 
     def last_words(self) -> str:
         lines = self._shard.with_suffix(".log").read_text(encoding="utf-8", errors="replace").split("\n")

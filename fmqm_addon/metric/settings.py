@@ -15,6 +15,7 @@ COLOR_SPACES = ("rgb", "lab")
 POOLINGS = ("geometric", "arithmetic")
 
 MIN_SAMPLES_PER_PATCH = 32  # below it the moments of a patch say nothing
+MAX_SAMPLES = 100_000_000  # 500 times the paper's; they take 30 GB of memory
 FAST_SCORED_PATCHES = 40  # preset "fast": the first FPS centres still cover the surface evenly
 
 
@@ -23,7 +24,7 @@ class Settings:
     """Hyperparameters (VI-C "Experimental Setup", unless said otherwise).
 
     Attributes:
-        samples: target number of samples over the whole surface, N_target.
+        samples: target number of samples over the whole surface, N_target; at most MAX_SAMPLES.
         patches: number of local surface patches, N_patch.
         scored_patches: only the first so many patches are scored, at full density; None scores all.
         sigma: standard deviation of the normal offset, in patch diagonals, sigma_base (V-C).
@@ -62,6 +63,7 @@ class Settings:
             _require(whole, name, value, "a whole number")
         for name in ("samples", "patches", "color_units"):
             _require(getattr(self, name) >= 1, name, getattr(self, name), "at least 1")
+        _require(self.samples <= MAX_SAMPLES, "samples", self.samples, f"at most {MAX_SAMPLES}")
         if self.scored_patches is not None:
             _require(self.scored_patches >= 1, "scored_patches", self.scored_patches, "at least 1")
         _require(0 <= self.sigma < math.inf, "sigma", self.sigma, "a finite number, at least 0")

@@ -1,15 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writing files whole or not at all."""
+"""Writing files whole or not at all, never in the place of what is read; and to standard output."""
 
 from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TextIO
 
-from ..metric.errors import FileError
+from ..metric.errors import FileError, SettingsError
+
+STDOUT = "-"  # in the place of a path
 
 
 @contextmanager
@@ -48,6 +51,49 @@ def write_parts(path: str, parts: Iterable[str]) -> None:
         open(temporary, "w", encoding="utf-8", errors="backslashreplace", newline="") as file,
     ):
         file.writelines(parts)
+
+
+def print_parts(stream: TextIO, parts: Iterable[str]) -> None:
+    """Prints, and sees to it that it arrives. A pipe that nobody reads any more, such as that of head, is no error.
+
+    Raises:
+        FileError: it cannot be written, as where a disk is full.
+    """
+    try:
+        stream.writelines(parts)
+        stream.flush()
+    except OSError as error:
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, stream.fileno())  # what is still buffered must not fail again when the stream closes
+        os.close(nowhere)
+        if not isinstance(error, BrokenPipeError):
+            raise FileError(f"the output cannot be printed ({error.strerror or error})") from error
+
+
+def check_apart(outputs: Mapping[str, str | None], inputs: Iterable[str]) -> None:
+    """Outputs must not replace inputs or each other, by whatever names and links.
+
+    Args:
+        outputs: paths by the flags that name them; STDOUT and None are no files.
+
+    Raises:
+        SettingsError: they do; the text names the flags.
+    """
+    places = {flag: path if path == STDOUT else _place(path) for flag, path in outputs.items() if path}
+    flags: dict[str, str] = {}
+    for flag, place in places.items():
+        if flags.setdefault(place, flag) != flag:
+            raise SettingsError(f"{flags[place]} and {flag} both write to {outputs[flag]}; name two files")
+    for place in map(_place, inputs):
+        if place in flags:
+            raise SettingsError(f"{flags[place]} {outputs[flags[place]]}: this file is an input; name another")
+
+
+def _place(path: str) -> str:
+    try:
+        return os.path.normcase(os.path.realpath(path))
+    except ValueError:  # no path on this system, which others say
+        return path
 
 
 def check_writable(path: str) -> None:

@@ -18,6 +18,14 @@ def below(record: Mapping[str, Any]) -> bool:
     return record["FMQM"] is not None and record["FMQM"] < (record["fail_under"] or 0)
 
 
+def shortfall(record: Mapping[str, Any]) -> str:
+    """By how much a pair that is below its threshold misses it; with so many digits that it shows."""
+    shown = f"{record['FMQM']:.4f}"
+    if float(shown) >= record["fail_under"]:
+        shown = repr(record["FMQM"])
+    return f"FMQM {shown} is below {record['fail_under']:g}"
+
+
 def junit_parts(records: Iterable[Mapping[str, Any]]) -> Iterator[str]:
     """The text of a document; goes through the records twice.
 
@@ -44,8 +52,7 @@ def _case(record: Mapping[str, Any]) -> ElementTree.Element:
         ElementTree.SubElement(case, "error", message=_text(record["error"]))
     elif below(record):
         features = ", ".join(f"{name} {record[name]:.4f}" for name in SHOWN[1:])
-        message = f"FMQM {record['FMQM']:.4f} is below {record['fail_under']:g}: {features}"
-        ElementTree.SubElement(case, "failure", message=message)
+        ElementTree.SubElement(case, "failure", message=f"{shortfall(record)}: {features}")
     if record["warnings"]:
         ElementTree.SubElement(case, "system-out").text = _text("\n".join(record["warnings"]))
     return case

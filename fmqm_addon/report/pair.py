@@ -171,3 +171,6 @@ def _columns(values: Floats | None) -> dict[str, float | None]:
         return dict.fromkeys(SHOWN)
     numbers = np.asarray(values, np.float64).tolist()
     return {name: numbers[_INDEX[name]] for name in SHOWN}
+
+
+RECORD_KEYS = frozenset(pair_record(PairScore("", "")))  # what each record has

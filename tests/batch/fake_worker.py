@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A worker that scores nothing but behaves as the names of its pairs say: die, die once, nap, hang, swell, refuse."""
+"""A worker that scores nothing but does what the names of its pairs say: die, die once, quit, nap, hang, swell."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from fmqm_addon.batch.journal import Journal
 from fmqm_addon.batch.rows import task_of
 from fmqm_addon.batch.workers import end_with_parent, journal_of
+from fmqm_addon.report.pair import PairScore, pair_record
 
 shard = Path(sys.argv[-1])
 end_with_parent()
@@ -29,6 +30,8 @@ for task in (task_of(plain) for plain in json.loads(shard.read_text(encoding="ut
     if name == "die" or (name == "die once" and not once.exists()):
         once.touch()
         os.kill(os.getpid(), signal.SIGKILL)
+    if name == "quit":
+        sys.exit("no memory here")
     if name == "nap":
         time.sleep(1)
     if name == "hang":
@@ -37,4 +40,5 @@ for task in (task_of(plain) for plain in json.loads(shard.read_text(encoding="ut
         swollen = bytearray(300_000_000)
         swollen[::4096] = b"x" * len(swollen[::4096])
         time.sleep(60)
-    journal.done(task.key, {"id": task.row.id, "FMQM": 0.5, "error": None, "pid": os.getpid()})
+    scores = {"id": task.row.id, "FMQM": 0.5, "pid": os.getpid()}
+    journal.done(task.key, pair_record(PairScore("reference", name)) | scores)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import re
 import signal
 import subprocess
@@ -17,6 +18,11 @@ from xml.etree import ElementTree
 
 import pytest
 
+from fmqm_addon.batch.journal import Journal
+from fmqm_addon.batch.log import Log
+from fmqm_addon.batch.rows import Options, Row, Task
+from fmqm_addon.batch.run import score_tasks
+from fmqm_addon.metric.settings import Settings
 from tests.blender.script import (
     COLUMNS,
     SCORE,
@@ -72,7 +78,7 @@ def bytes_but_for_seconds(path: Path) -> str:
 
 @pytest.mark.once
 def test_200_pairs_five_hostile_killed_twice_and_resumed(assets: Path, tmp_path: Path) -> None:
-    """As if nothing had happened: 195 scores, five errors, each once, the same bytes as an undisturbed run."""
+    """As if nothing had happened: 195 scores, each made once, five errors, the same bytes as an undisturbed run."""
     rows = [row | {"seed": seed, "id": f"{seed} {row['distorted']}"} for seed in range(10) for row in pairs_of(*SHAKEN)]
     for place, name in zip((0, 50, 99, 100, 199), HOSTILE, strict=True):
         rows[place] |= {"distorted": name}
@@ -97,12 +103,16 @@ def test_200_pairs_five_hostile_killed_twice_and_resumed(assets: Path, tmp_path:
     assert not (tmp_path / "killed" / "all.json").exists()
     assert score(*command, *outputs("killed"), "--jobs", "2", "--resume").returncode == 1
 
-    done = Counter(event["done"] for event in events(journal) if "done" in event)
-    assert len(done) == 200 and set(done.values()) == {1}
+    done = [event for event in events(journal) if "done" in event]
+    times = Counter(event["done"] for event in done if event["pair"]["error"] is None)
+    assert len(times) == 195 and set(times.values()) == {1}, "no score was made twice"
+    assert len({event["done"] for event in done}) == 200
     pairs = read_json(tmp_path / "killed" / "all.json")["pairs"]
-    assert [pair["id"] for pair in pairs] == [row["id"] for row in rows]
+    assert [pair["id"] for pair in pairs] == [row["id"] for row in rows], "no duplicates"
+    with (tmp_path / "killed" / "all.csv").open(encoding="utf-8", newline="") as table:
+        assert [row["id"] for row in csv.DictReader(table)] == [row["id"] for row in rows]
     assert [pair["distorted"] for pair in pairs if pair["error"]] == HOSTILE
-    assert all(0 < pair["FMQM"] <= 1 for pair in pairs if not pair["error"])
+    assert sum(0 < pair["FMQM"] <= 1 for pair in pairs if not pair["error"]) == 195
     for kind in ("json", "csv", "junit"):
         calm, killed = (bytes_but_for_seconds(tmp_path / folder / f"all.{kind}") for folder in ("calm", "killed"))
         assert calm == killed
@@ -142,6 +152,96 @@ def test_resuming_scores_what_is_missing_or_has_changed(assets: Path, tmp_path: 
     assert len(scored(journal)) == 6 + 5, "another seed is another score for all"
     assert score("--manifest", assets / "pairs.json", *command[:-2]).returncode == 1
     assert len(scored(journal)) == 5, "without --resume it begins anew"
+
+
+def test_resuming_tries_errors_again_whose_cause_may_be_repaired(assets: Path, tmp_path: Path) -> None:
+    """An image that was missing is no file that the row names, so that nothing else tells that it has come."""
+    image = noise(seed=1)
+    write_png(tmp_path / "a.png", image)
+    write_torus(tmp_path, "ref", "a.png")
+    write_torus(tmp_path, "late", "late.png")
+    write_manifest(tmp_path, pairs_of("ref.obj", "late.obj", "nowhere.obj"))
+    command = ["--manifest", "pairs.json", *TINY, "--csv", "c", "--resume", "--quiet"]
+    assert "late.png" in score(*command, cwd=tmp_path).stderr
+    write_png(tmp_path / "late.png", image)
+    done = score(*command, cwd=tmp_path)
+    assert done.returncode == 1 and done.stderr.splitlines() == ["score.py: nowhere.obj: no such file"]
+    journal = tmp_path / "c.journal.jsonl"
+    assert Counter(scored(journal)) == {"ref.obj": 1, "late.obj": 2, "nowhere.obj": 2}
+    rows = list(csv.DictReader((tmp_path / "c").read_text(encoding="utf-8").splitlines()))
+    assert [(row["id"], row["FMQM"]) for row in rows] == [("ref.obj", "1.0"), ("late.obj", "1.0"), ("nowhere.obj", "")]
+
+
+def test_what_nobody_has_foreseen_is_an_error_of_its_pair(
+    assets: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where it comes with the reference; the others are scored."""
+    pytest.importorskip("bpy")
+    from fmqm_addon.blender import files
+
+    load = files.load_placed
+
+    def fail(path: str, *others: Any) -> Any:
+        if "shaken1" in path:
+            raise MemoryError("Unable to allocate 797 GiB\nfor an array")
+        if "shaken2" in path:
+            raise OverflowError("too large")
+        return load(path, *others)
+
+    monkeypatch.setattr(files, "load_placed", fail)
+    journal = Journal()
+    names = [("ref.obj", "shaken1.obj"), ("shaken2.obj", "ref.obj"), ("ref.obj", "ref.obj")]
+    tasks = [Task(str(k), Row(f"id {k}", *pair, folder=str(assets))) for k, pair in enumerate(names)]
+    score_tasks(tasks, Options(Settings(samples=640, patches=20)), journal, Log("", 5, 3, silent=True))
+    assert [journal.record(task.key)["error"] for task in tasks] == [
+        r"shaken1.obj: MemoryError: Unable to allocate 797 GiB\nfor an array",
+        "shaken2.obj: OverflowError: too large",
+        None,
+    ]
+
+
+def test_files_are_written_though_nobody_reads_the_table(assets: Path, tmp_path: Path) -> None:
+    """As with | head -1; errors of a full disk are one line, and leave the files as well."""
+    manifest = write_manifest(assets, pairs_of("ref.obj", "cut.glb"))
+    for name, words in (("pipe", []), ("full", ["the output cannot be printed (No space left on device)"])):
+        if name == "full" and not Path("/dev/full").exists():
+            pytest.skip("this system has no full device")
+        reader, writer = os.pipe()
+        os.close(reader)
+        with os.fdopen(writer, "w") if name == "pipe" else open("/dev/full", "w") as out:
+            command = [sys.executable, SCORE, "--manifest", manifest, *TINY, "--csv", tmp_path / name, "--quiet"]
+            done = subprocess.run(list(map(str, command)), stdout=out, stderr=subprocess.PIPE, text=True)
+        assert done.returncode == 1 and (tmp_path / name).read_text().count("\n") == 3
+        assert done.stderr.splitlines()[1:] == [f"score.py: {each}" for each in words]
+
+
+def test_the_work_goes_on_though_nobody_reads_its_progress(assets: Path, tmp_path: Path) -> None:
+    """As with 2>&1 | head -1."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    command = [sys.executable, SCORE, assets / "ref.obj", assets / "ref.obj", *TINY, "--csv", tmp_path / "c"]
+    with os.fdopen(writer, "w") as out:
+        done = subprocess.run(list(map(str, command)), stdout=out, stderr=out)
+    assert done.returncode == 0 and "1.0" in (tmp_path / "c").read_text()
+
+
+def test_remarks_name_their_pairs(assets: Path, tmp_path: Path) -> None:
+    """Where there are several; a warning of all of them comes once. Below a threshold, each pair has a line."""
+    write_torus(tmp_path, "bare")
+    rows = [
+        {"reference": "bare.obj", "distorted": "bare.obj", "id": "first"},
+        {"reference": "bare.obj", "distorted": str(assets / SHAKEN[9]), "id": "second", "fail_under": 0.999},
+        {"reference": "bare.obj", "distorted": "gone.obj", "id": "third"},
+    ]
+    manifest = write_manifest(tmp_path, rows)
+    for jobs in ((), ("--jobs", "1")):
+        done = score("--manifest", manifest, *TINY, *jobs, "--csv", tmp_path / "c")
+        assert done.returncode == 1
+        error, warning, below = (line for line in done.stderr.splitlines() if line.startswith("score.py: "))
+        assert error.startswith("score.py: third: ") and error.endswith("gone.obj: no such file")
+        assert warning.startswith("score.py: warning: first and 1 more: bare: ")
+        assert re.fullmatch(r"score.py: second: FMQM 0\.\d{4} is below 0\.999", below)
+        assert any(f" {how} second" in done.stderr for how in ("scoring", "scored"))
 
 
 def test_interrupted_run_says_how_to_go_on(assets: Path, tmp_path: Path) -> None:
@@ -190,9 +290,12 @@ def test_shards_merge_into_the_whole(assets: Path, tmp_path: Path) -> None:
     done = score("--merge", *parts, "--manifest", manifest, "--json", tmp_path / "merged")
     assert (done.returncode, done.stdout) == (whole.returncode, whole.stdout)
     assert without_seconds(read_json(tmp_path / "merged")) == without_seconds(read_json(tmp_path / "whole"))
+    alone = score("--merge", *parts, "--json", tmp_path / "alone")
+    assert (alone.returncode, alone.stdout) == (whole.returncode, whole.stdout), "the parts know their places"
+    assert (tmp_path / "alone").read_bytes() == (tmp_path / "merged").read_bytes()
     gap = score("--merge", tmp_path / "1", tmp_path / "1", "--manifest", manifest, "--csv", tmp_path / "c")
     assert gap.returncode == 1
-    assert [line for line in gap.stderr.splitlines() if "is there twice" in line] and "none of the parts" in gap.stderr
+    assert [line for line in gap.stderr.splitlines() if "is there twice" in line] and "none of the merged" in gap.stderr
     rows = list(csv.DictReader((tmp_path / "c").read_text(encoding="utf-8").splitlines()))
     assert [bool(row["error"]) for row in rows] == [False, True, False, True, False]
     assert score(*command, "--seed", 5, "--shard", "2/2", "--json", tmp_path / "2").returncode in (0, 1)
@@ -225,6 +328,9 @@ def test_lod_chains_of_a_file(assets: Path, tmp_path: Path) -> None:
     assert done.returncode == 1 and "ref.obj: no names in it tell levels" in done.stderr
 
 
+MISSING = ("none.csv: cannot be read", "no file matches")  # files, which are no wrong arguments
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -241,12 +347,18 @@ def test_lod_chains_of_a_file(assets: Path, tmp_path: Path) -> None:
         (("ref.obj", "a.obj", "--shard", "3/2"), "--shard is 3/2"),
         (("ref.obj", "a.obj", "--resume"), "--resume needs"),
         (("ref.obj", "a.obj", "--jobs", "1", "--picture", "p.png"), "--picture"),
+        (("--manifest", "empty.json"), "no rows in it"),
+        (("--manifest", "object.json"), "a list of objects"),
+        (("--merge", "part.json", "--shard", "1/2"), "leave out --shard"),
+        (("ref.obj", "a.obj", "--journal", "a.png"), "a.png: this file is not a journal"),
         (("ref.obj", "a.obj", "--jobs", "1", "--dask", "tcp://127.0.0.1:1"), "--dask exclude each other"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
 )
 def test_wrong_arguments_are_one_line(assets: Path, arguments: tuple[str, ...], words: str) -> None:
     (assets / "bad.csv").write_text("reference,distorted,samples\nref.obj,b,x\n")
+    (assets / "empty.json").write_text("[]")
+    (assets / "object.json").write_text("{}")
     done = score(*arguments, cwd=assets)
-    assert done.returncode in (1, 2) and done.stdout == ""
+    assert done.returncode == (1 if words in MISSING else 2) and done.stdout == ""
     assert words in done.stderr and len(done.stderr.splitlines()) == 1

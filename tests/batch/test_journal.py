@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from dataclasses import replace
 from pathlib import Path
@@ -10,17 +11,18 @@ from typing import Any
 
 import pytest
 
-from fmqm_addon.batch.journal import Journal, Records, row_key
+from fmqm_addon.batch.journal import Journal, Records, parse_line, row_key
 from fmqm_addon.batch.rows import Options, Row
-from fmqm_addon.metric.errors import FileError
+from fmqm_addon.metric.errors import FileError, SettingsError
 from fmqm_addon.metric.settings import Settings
+from fmqm_addon.report.pair import PairScore, pair_record
 
 VERSIONS = {"fmqm_version": "1", "blender_version": "5"}
 OPTIONS = Options(Settings())
 
 
 def record(name: str, score: float | None = 0.5) -> dict[str, Any]:
-    return {"id": name, "FMQM": score, "error": None if score else "broken"}
+    return pair_record(PairScore("r", name, error=None if score else "broken")) | {"FMQM": score}
 
 
 def test_resuming_finds_what_was_done_and_replacing_does_not(tmp_path: Path) -> None:
@@ -61,15 +63,75 @@ def test_rubbish_between_lines_costs_only_itself(tmp_path: Path) -> None:
     assert Journal(str(path), resume=True).record("a") == record("a")
 
 
-def test_a_pair_that_ended_its_worker_has_a_record_but_is_worth_another_run(tmp_path: Path) -> None:
+def test_an_error_is_a_record_but_worth_another_run_and_the_last_record_counts(tmp_path: Path) -> None:
     path = str(tmp_path / "j")
     journal = Journal(path)
-    journal.done("a", record("a", None), lost=True)
-    assert "a" not in journal and journal.record("a")["error"] == "broken"
+    journal.done("a", record("a", None))
+    assert "a" in journal and not journal.has_scores("a") and journal.record("a")["error"] == "broken"
     journal.done("a", record("a"))
     journal.close()
     resumed = Journal(path, resume=True)
-    assert "a" in resumed and resumed.record("a") == record("a")
+    assert resumed.has_scores("a") and resumed.record("a") == record("a")
+
+
+@pytest.mark.parametrize(
+    "line",
+    ['{"done": ["a"]}', '{"done": "a"}', '{"done": "a", "pair": {}}', '{"start": {}}', "7", "[" * 100_000],
+    ids=lambda line: line[:20],
+)
+def test_what_an_editor_left_is_skipped(tmp_path: Path, line: str) -> None:
+    assert parse_line(line.encode()) == {}
+    path = tmp_path / "j"
+    journal = Journal(str(path))
+    journal.done("b", record("b"))
+    journal.close()
+    path.write_text(f"{path.read_text()}{line}\n")
+    resumed = Journal(str(path), resume=True)
+    assert "a" not in resumed and "b" in resumed
+
+
+@pytest.mark.parametrize("resume", [False, True])
+def test_a_file_of_another_kind_is_refused_and_left(tmp_path: Path, resume: bool) -> None:
+    path = tmp_path / "precious.txt"
+    for text in ("v 0 0 0\n", "id,reference\na,b\n", '{"start": 0.5, "text": "hello"}\n', "\n\n", "x"):
+        path.write_text(text)
+        with pytest.raises(SettingsError, match="precious.txt: this file is not a journal"):
+            Journal(str(path), resume)
+        assert path.read_text() == text
+    for text in ("", '{"sta', '{"done": "a", "pa'):
+        path.write_text(text)
+        Journal(str(path), resume).close()
+        assert path.read_text() == ""
+
+
+def test_a_full_disk_is_an_error_and_no_torn_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A disk that is nearly full takes a part of the line before it says so."""
+    path = tmp_path / "j"
+    journal = Journal(str(path))
+    journal.done("a", record("a"))
+    whole = path.read_bytes()
+    filling = NearlyFull(journal._file)
+    monkeypatch.setattr(journal, "_file", filling)
+    with pytest.raises(FileError, match="j: the journal cannot be written .No space"):
+        journal.done("b", record("b"))
+    assert "b" not in journal and path.read_bytes() == whole
+
+
+class NearlyFull:
+    """A file on a disk that has room for ten more bytes."""
+
+    def __init__(self, file: Any) -> None:
+        self._file = file
+        self._room = 10
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._file, name)
+
+    def write(self, data: memoryview) -> int:
+        if not self._room:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        self._room = 0
+        return int(self._file.write(data[:10]))
 
 
 def test_two_runs_do_not_share_a_journal(tmp_path: Path) -> None:

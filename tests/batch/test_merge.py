@@ -62,6 +62,54 @@ def test_limits_of_the_manifest_and_the_arguments_count(
     assert main(["--merge", part, *manifest, *limit], io.StringIO()) == code
 
 
+def test_a_threshold_that_is_missed_by_a_hair_is_said_with_enough_digits(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    part = write_part(tmp_path, "a", FMQM=0.499999, fail_under=0.5)
+    assert main(["--merge", part, "--junit", str(tmp_path / "x")], io.StringIO()) == 1
+    assert capsys.readouterr().err == "score.py: a: FMQM 0.499999 is below 0.5\n"
+    assert "FMQM 0.499999 is below 0.5: " in (tmp_path / "x").read_text()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("reference,distorted,id\nr,b,a\n", "distorted a instead of b"),
+        ("reference,distorted\nother,a\n", "reference r instead of other"),
+        ("reference,distorted,texture\nr,a,t.png\n", "texture none instead of t.png"),
+        ("reference,distorted,samples\nr,a,9000\n", "settings none instead of {'samples': 9000}"),
+    ],
+)
+def test_a_record_of_another_row_does_not_count(
+    tmp_path: Path, text: str, words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Unless another part has the row's own."""
+    manifest = write_manifest(tmp_path, text)
+    arguments = ["--merge", write_part(tmp_path, "a"), "--manifest", manifest, "--csv", str(tmp_path / "c")]
+    assert main(arguments, io.StringIO()) == 1
+    assert words in capsys.readouterr().err and words in (tmp_path / "c").read_text().replace('""', '"')
+
+
+def test_of_two_parts_the_one_that_is_the_rows_counts(tmp_path: Path) -> None:
+    old = Path(write_part(tmp_path, "a", reference="older")).rename(tmp_path / "old.json")
+    manifest = write_manifest(tmp_path, "reference,distorted\nr,a\n")
+    assert main(["--merge", str(old), write_part(tmp_path, "a"), "--manifest", manifest], io.StringIO()) == 0
+
+
+def test_shards_know_their_places_and_which_is_missing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    parts = []
+    for number, names in ((3, "c"), (1, "ad"), (2, "be")):
+        part = Path(write_part(tmp_path, *names))
+        document = json.loads(part.read_text()) | {"shard": [number, 3]}
+        parts.append(str(part.rename(tmp_path / f"{number}.json")))
+        Path(parts[-1]).write_text(json.dumps(document))
+    out = io.StringIO()
+    assert main(["--merge", *parts], out) == 0
+    assert [line[0] for line in out.getvalue().splitlines()[1:]] == list("abcde")
+    assert main(["--merge", *parts[:2]], io.StringIO()) == 1
+    assert "shard 2/3" in capsys.readouterr().err
+
+
 def test_the_unforeseen_ends_with_1() -> None:
     """Under Blender too, which would go on after an exception that leaves the script."""
     code = (

@@ -54,7 +54,9 @@ def test_a_csv_and_a_json_manifest_say_the_same(tmp_path: Path) -> None:
         ("reference,distorted,id\na,b,x\na,c,x\n", "row 3: id x is that of row 2"),
         ("reference,distorted\n", "no rows"),
         ("", "no rows"),
-        ("reference;distorted\na;b\n", "unknown column reference;distorted"),
+        ("reference,distorted\n,\n", "no rows"),
+        ('reference,distorted\na,"b\nc,d\n', "are all quotes closed"),
+        ("reference,distorted,samples\na,b,1000000000000\n", "row 2: samples is 1000000000000; it must be at most"),
         ("reference,distorted\n\0", "no distorted"),
     ],
 )
@@ -86,9 +88,26 @@ def test_a_wrong_json_manifest(tmp_path: Path, text: str, words: str) -> None:
 
 def test_what_is_no_manifest(tmp_path: Path) -> None:
     (tmp_path / "latin.csv").write_bytes(b"reference,distorted\n\xe4,b\n")
-    for name, words in (("latin.csv", "UTF-8"), ("none.csv", "cannot be read"), ("pairs.txt", "must end in")):
+    (tmp_path / "excel.csv").write_text("reference,distorted\na,b\n", encoding="utf-16")
+    for name, words in (("latin.csv", "UTF-8"), ("excel.csv", "UTF-8"), ("none.csv", "cannot be read")):
         with pytest.raises(FileError, match=words):
             read_manifest(str(tmp_path / name), SETTINGS)
+    with pytest.raises(SettingsError, match="must end in"):
+        read_manifest(str(tmp_path / "pairs.txt"), SETTINGS)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "reference, distorted , id\nr, a,x\n",
+        "reference;distorted;id\nr;a;x\n",
+        "\ufeffreference\tdistorted\tid\r\nr\ta\tx\r\n",
+        "reference,distorted,id\n\n,,\nr,a,x\n , ,\n",
+    ],
+)
+def test_what_spreadsheets_and_people_write(tmp_path: Path, text: str) -> None:
+    (row,) = read_manifest(write(tmp_path, text), SETTINGS)
+    assert (row.reference, row.distorted, row.id) == ("r", "a", "x")
 
 
 def test_ids_are_made_unique_and_leave_given_ones_alone(tmp_path: Path) -> None:

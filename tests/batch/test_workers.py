@@ -10,6 +10,7 @@ import sys
 import time
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -18,7 +19,8 @@ from fmqm_addon.batch.journal import Journal, parse_line
 from fmqm_addon.batch.log import Log
 from fmqm_addon.batch.rows import Row, Task
 from fmqm_addon.batch.workers import Limits, adopt, journal_of, score_with_workers
-from fmqm_addon.metric.errors import FMQMError
+from fmqm_addon.metric.errors import FileError, FMQMError
+from fmqm_addon.report.pair import PairScore, pair_record
 
 FAKE = Path(__file__).parent / "fake_worker.py"
 ROOT = Path(__file__).resolve().parents[2]
@@ -26,6 +28,10 @@ ROOT = Path(__file__).resolve().parents[2]
 
 def tasks_of(*names: str) -> list[Task]:
     return [Task(f"k{number}", Row(str(number), "reference", name)) for number, name in enumerate(names)]
+
+
+def record(name: str, score: float | None) -> dict[str, Any]:
+    return pair_record(PairScore("r", name, error=None if score else "broken")) | {"FMQM": score}
 
 
 def watch(folder: Path, tasks: list[Task], jobs: int = 2, limits: Limits | None = None, told: str = "") -> Journal:
@@ -59,6 +65,7 @@ def test_each_pair_is_scored_once_by_as_many_workers_as_there_are_jobs(tmp_path:
     ("name", "limits", "words"),
     [
         ("die", Limits(), "its worker died (SIGKILL), 2 times"),
+        ("quit", Limits(), "its worker ended with exit code 1, saying: no memory here, 2 times"),
         ("hang", Limits(timeout=1.5), "not scored within 1.5 s (--timeout), 2 times"),
         ("swell", Limits(memory=2e8), "scoring it takes more than 0.2 GB of memory (--memory-limit), 2 times"),
     ],
@@ -70,7 +77,7 @@ def test_a_pair_that_ends_its_worker_costs_only_itself(tmp_path: Path, name: str
     error = journal.record("k1")["error"]
     assert error.startswith(f"{name}: ") and words in error
     assert [task.key for task in tasks if journal.record(task.key)["error"]] == ["k1"]
-    assert "k1" not in journal, "a resumed run may try it again"
+    assert not journal.has_scores("k1"), "a resumed run tries it again"
     assert not alive(tmp_path)
 
 
@@ -82,11 +89,30 @@ def test_a_pair_that_fails_once_is_tried_once_more(tmp_path: Path) -> None:
 def test_what_a_killed_run_has_left_is_not_the_new_runs(tmp_path: Path) -> None:
     for number in range(1, 4):
         stale = Journal(journal_of(str(tmp_path / f"shard-{number}.json")))
-        stale.done("k0", {"id": "0", "FMQM": 0.1, "error": None})
-        stale.done("other", {"id": "other", "FMQM": 0.1, "error": None})
+        stale.done("k0", record("0", 0.1))
+        stale.done("other", record("other", 0.1))
         stale.close()
     journal = watch(tmp_path, tasks_of("fine", "fine"))
     assert finished(tmp_path) == Counter(["k0", "k1"]) and journal.record("k0")["FMQM"] == 0.5
+
+
+def test_only_scores_are_adopted_and_only_new_ones(tmp_path: Path) -> None:
+    left = Journal(journal_of(str(tmp_path / "shard-1.json")))
+    for key, score in (("scored", 0.1), ("repaired", 0.1), ("failed", None), ("new", 0.1)):
+        left.done(key, record(key, score))
+    left.close()
+    journal = Journal()
+    journal.done("scored", record("scored", 0.9))
+    journal.done("repaired", record("repaired", None))
+    adopt(tmp_path, journal)
+    scores = {key: journal.record(key)["FMQM"] for key in ("scored", "repaired", "new")}
+    assert scores == {"scored": 0.9, "repaired": 0.1, "new": 0.1} and "failed" not in journal
+
+
+def test_a_worker_that_cannot_be_started_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(FileError, match="shard-1.json: a worker cannot be started"):
+        score_with_workers(tasks_of("fine"), ["x"], tmp_path / "file", 1, Limits(), Journal(), Log("", 1, 1))
 
 
 def test_a_watch_that_stood_still_does_not_take_the_workers_for_stuck(

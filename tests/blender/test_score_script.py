@@ -32,7 +32,7 @@ from .script import (
 
 PAIR_KEYS = [
     "id", "reference", "distorted", *COLUMNS, "stderr", "patches", "samples", "seconds", "warnings", "error",
-    "reverse", "trust", "settings", "fail_under",
+    "reverse", "trust", "ref_texture", "texture", "settings", "fail_under",
 ]  # fmt: skip
 SETTING_FLAGS = [
     "samples", "patches", "scored-patches", "sigma", "radius", "gradient-radius", "normal-threshold",
@@ -371,13 +371,14 @@ def test_every_setting_reaches_the_metric(assets: Path, tmp_path: Path) -> None:
 
 WRONG = [
     ("samples", "0"), ("samples", "-5"), ("samples", "many"), ("samples", "1e5"), ("samples", "639"),
-    ("patches", "0"), ("patches", "101"), ("patches", "1.5"), ("scored-patches", "0"),
+    ("samples", str(10**26)), ("patches", "0"), ("patches", "101"), ("patches", "1.5"), ("scored-patches", "0"),
     ("sigma", "-0.1"), ("sigma", "nan"), ("sigma", "inf"), ("radius", "0"), ("radius", "nan"),
     ("gradient-radius", "-1"), ("gradient-radius", "nan"), ("normal-threshold", "1.5"), ("normal-threshold", "nan"),
     ("tangent-threshold", "-0.1"), ("color-units", "0"), ("centers", "sobol"), ("color-space", "hsv"),
     ("pooling", "median"), ("seed", "-1"), ("seed", "x"), ("seed", str(2**63)), ("preset", "slow"), ("repeats", "0"),
     ("bake", "-1"), ("bake", "20000"), ("bake", "x"), ("max-image-side", "0"), ("max-image-bytes", "0"),
     ("fail-under", "2"), ("fail-under", "-0.1"), ("fail-under", "nan"), ("save-fields", "fields.txt"),
+    ("picture", "picture.txt"), ("journal", "-"), ("report", "-"),
 ]  # fmt: skip
 
 
@@ -617,6 +618,42 @@ def test_outputs_replace_older_files_whole(assets: Path, whole: Path, tmp_path: 
     assert [path.name for path in tmp_path.iterdir()] == ["j"]
 
 
+@pytest.mark.parametrize(
+    ("flag", "name"),
+    [
+        ("--json", "../assets/mesh.obj"), ("--csv", "base.obj"), ("--journal", "mesh.obj"), ("--junit", "given.png"),
+        ("--csv", "pairs.csv"), ("--picture", "named.png"), ("--csv", "named.png"), ("--csv", "all.json"),
+    ],
+)  # fmt: skip
+def test_outputs_do_not_replace_inputs(tmp_path: Path, flag: str, name: str) -> None:
+    """What the row names, what the mesh names, the manifest; nor each other."""
+    folder = tmp_path / "assets"
+    folder.mkdir()
+    for image in ("named.png", "given.png"):
+        write_png(folder / image, noise())
+    for mesh in ("base", "mesh"):
+        write_torus(folder, mesh, "named.png")
+    (folder / "pairs.csv").write_text("reference,distorted,ref_texture\nbase.obj,mesh.obj,given.png\n")
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    pair = ("base.obj", "mesh.obj", "--ref-texture", "given.png")
+    pairs = ("--manifest", "pairs.csv") if flag == "--csv" else pair
+    outputs = {"--json": "all.json"} | {flag: name}
+    done = score(*pairs, *SMALL, "--quiet", *(word for item in outputs.items() for word in item), cwd=folder)
+    assert done.returncode == 2 and flag in one_line(done.stderr)
+    after = {path.name: path.read_bytes() for path in folder.iterdir()}
+    assert {name: after[name] for name in before} == before
+
+
+def test_one_kind_of_text_goes_to_stdout(assets: Path, whole: Path, tmp_path: Path) -> None:
+    for flag in ("--csv", "--junit"):
+        done = score(assets / "ref.obj", assets / "shaken.obj", *SMALL, flag, "-", "--quiet", cwd=tmp_path)
+        assert done.returncode == 0 and not list(tmp_path.iterdir())
+        kind = done.stdout.partition("\n")[0]
+        assert kind == (whole / "all.csv").read_text().partition("\n")[0] or kind.startswith("<?xml")
+    done = score("ref.obj", "shaken.obj", *SMALL, "--json", "-", "--csv", "-", cwd=assets)
+    assert done.returncode == 2 and "--json and --csv both" in one_line(done.stderr)
+
+
 # What is not installed
 
 
@@ -635,7 +672,7 @@ def test_without_pillow_only_the_picture_is_missing(assets: Path, whole: Path, t
     done = score("ref.obj", "shaken.obj", *SMALL, *outputs, "--picture", out / "p.png", cwd=assets, env=env)
     assert done.returncode == 1 and "Pillow" in one_line(done.stderr)
     assert done.stdout == (whole / "stdout").read_text(encoding="utf-8")
-    assert sorted(path.name for path in out.iterdir()) == ["c", "f.npz", "j"]
+    assert sorted(path.name for path in out.iterdir()) == ["c", "f.npz", "j", "j.journal.jsonl"]
     assert without_seconds(read_json(out / "j")) == without_seconds(read_json(whole / "all.json"))
 
 

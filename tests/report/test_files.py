@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from fmqm_addon.metric.errors import FileError
-from fmqm_addon.report.files import check_writable, write_text
+from fmqm_addon.metric.errors import FileError, SettingsError
+from fmqm_addon.report.files import check_apart, check_writable, write_text
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
@@ -34,3 +34,17 @@ def test_a_link_stays_and_what_it_names_is_written(tmp_path: Path) -> None:
     (tmp_path / "lost").symlink_to(tmp_path / "nowhere" / "file")
     with pytest.raises(FileError, match="does not exist"):
         check_writable(str(tmp_path / "lost"))
+
+
+def test_outputs_are_kept_apart_from_inputs_and_each_other(tmp_path: Path) -> None:
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "link").symlink_to(tmp_path / "model.obj")
+    path = str(tmp_path / "model.obj")
+    check_apart({"--json": "-", "--csv": f"{path}.csv", "--junit": None}, [path, "", "a\0b"])
+    for name in ("model.obj", "./folder/../model.obj", "link"):
+        with pytest.raises(SettingsError, match=r"^--csv .*: this file is an input"):
+            check_apart({"--json": "-", "--csv": f"{tmp_path}/{name}"}, ["", path])
+        with pytest.raises(SettingsError, match=r"^--json and --csv both write to"):
+            check_apart({"--json": path, "--csv": f"{tmp_path}/{name}"}, [])
+    with pytest.raises(SettingsError, match="both write to -"):
+        check_apart({"--json": "-", "--csv": "-"}, [])
