@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from fmqm_addon.batch.log import Log
 from fmqm_addon.blender.process import FAILED, OK, require_bpy, run_script
-from fmqm_addon.metric.errors import FMQMError, SettingsError
+from fmqm_addon.metric.errors import FMQMError, SettingsError, one_line
 from fmqm_addon.metric.settings import PRESETS, Settings
 from scripts.score import OneLineParser
 
@@ -35,8 +35,10 @@ def build_parser() -> OneLineParser:
         prog=PROGRAM,
         description="The fewest triangles (Decimate, collapse) or the smallest textures whose FMQM is at or above a "
         "target, found by bisection.",
-        epilog="Exit codes: 0 found and written; 1 the target is missed even by the dearest version allowed, or a file "
-        "cannot be read or written; 2 wrong arguments.",
+        epilog="With -o the versions that decide are scored as they are read back from such a file. Exit codes: 0 "
+        "found, written; 1 the target is missed even by the dearest version allowed, or a file cannot be read "
+        "or written; "
+        "2 wrong arguments.",
         allow_abbrev=False,
     )
     parser.add_argument("reference", metavar="REFERENCE", help="the original, as for score.py")
@@ -53,7 +55,8 @@ def build_parser() -> OneLineParser:
         parser.add_argument(f"--{name}", type=int, metavar="N", help=f"{text} (default: {getattr(Settings(), name)})")
     parser.add_argument(
         "-o", "--output", metavar="FILE",
-        help=".glb .obj .ply .stl .fbx .usd, or .blend, which keeps the modifier live; of a chain NAME_LOD1 and so on",
+        help=".glb .obj .ply .stl .fbx .usd, plain meshes as they are measured, without skeletons, shape keys and "
+        "animation; or .blend, which keeps these and the modifier live; of a chain NAME_LOD1 and so on",
     )  # fmt: skip
     parser.add_argument("--json", metavar="FILE", help="targets, versions and paths; - is stdout")
     parser.add_argument("--quiet", action="store_true", help="no progress on stderr")
@@ -75,11 +78,10 @@ def main(argv: Sequence[str], out: TextIO) -> int:
     try:
         settings = _settings(args)
         targets = _targets(args)
+        log = Log(PROGRAM, 1, 1, args.quiet)
+        return _search(args, targets, settings, log, out)
     except SettingsError as error:
         parser.error(str(error))
-    log = Log(PROGRAM, 1, 1, args.quiet)
-    try:
-        return _search(args, targets, settings, log, out)
     except FMQMError as error:
         log.say(str(error))
         return FAILED
@@ -110,39 +112,55 @@ def _search(args: argparse.Namespace, targets: list[float], settings: Settings, 
     """Searches, prints, writes; Blender is imported only once the arguments are known to be good."""
     require_bpy()
     from fmqm_addon.blender.decimate import Wish, reducing
-    from fmqm_addon.blender.reduced import check_ending, file_reader, save_version, texture_sizes
+    from fmqm_addon.blender.reduced import (
+        check_ending,
+        check_outputs,
+        file_reader,
+        save_version,
+        texture_sizes,
+        written_reader,
+    )
     from fmqm_addon.report.files import check_writable, write_text
 
     outputs = _output_names(args.output, targets if args.chain else [])
     for path in outputs:
         check_ending(path)
-    for path in (*outputs, args.json):
-        if path and path != "-":
-            check_writable(path)
+    files = [*outputs, *([args.json] if args.json and args.json != "-" else [])]
+    for path in files:
+        check_writable(path)
+    if files:
+        check_outputs(args.reference, files)
     sizes = () if args.target_texture is None else tuple(texture_sizes(args.reference))
     wish = Wish(tuple(targets), args.max_triangles, args.target_texture, sizes)
-    stepper = reducing(file_reader(args.reference), wish, settings)
+    written = written_reader(args.reference, outputs[0]) if outputs else None
+    stepper = reducing(file_reader(args.reference), wish, settings, written)
     while stepper.step():
         log.show(stepper.progress.done, stepper.progress.stage)
     log.end()
 
     reduced = stepper.result
-    document = _json_text(args.reference, settings, reduced)
+    errors, warnings = [], list(reduced.warnings)
+    saved: list[str | None] = [None] * len(reduced.outcomes)
+    for number, outcome in enumerate(reduced.outcomes):
+        if not outcome.last.reached:
+            errors.append(f"{args.reference}: {_missed(outcome, args.max_triangles, args.output)}")
+        elif outputs:
+            try:
+                warnings += save_version(args.reference, outcome.last.best.version, outputs[number])
+                saved[number] = outputs[number]
+            except FMQMError as error:
+                errors.append(str(error))
+    document = _json_text(args.reference, settings, reduced, saved)
     if args.json == "-":
         out.write(document)
     else:
-        out.write(_table(reduced))
+        out.write(_table(reduced, saved))
         if args.json:
             write_text(args.json, document)
     out.flush()
-    for warning in reduced.warnings:
-        log.say(f"warning: {warning}")
-    for number, outcome in enumerate(reduced.outcomes):
-        if not outcome.last.reached:
-            log.say(f"{args.reference}: {_missed(outcome, args.max_triangles)}")
-        elif outputs:
-            save_version(args.reference, outcome.last.best.version, outputs[number])
-    return OK if all(outcome.last.reached for outcome in reduced.outcomes) else FAILED
+    for line in (*(f"warning: {warning}" for warning in warnings), *errors):
+        log.say(line)
+    return FAILED if errors else OK
 
 
 def _output_names(output: str | None, chain: list[float]) -> list[str]:
@@ -153,29 +171,38 @@ def _output_names(output: str | None, chain: list[float]) -> list[str]:
     return [str(path.with_name(f"{path.stem}_LOD{number + 1}{path.suffix}")) for number in range(len(chain))]
 
 
-def _missed(outcome: Outcome, max_triangles: int | None) -> str:
+def _missed(outcome: Outcome, max_triangles: int | None, output: str | None) -> str:
     best, target = outcome.last.best, outcome.last.target
     score = "nothing that could be measured" if best.fmqm is None else f"FMQM {best.fmqm:.4f}"
-    if outcome.texture is not None:
-        return f"the target {target:g} is missed even with the textures as they are ({score}); ask for less"
+    kind, remedy = "", "ask for less"
+    if max_triangles is not None and outcome.texture is None:
+        remedy += ", or allow more"
+    if output is not None:
+        kind = f" as {Path(output).suffix.lower()}"
+        remedy += ", or choose another kind of file, if this one does not hold its materials"
     allowed = "all triangles" if max_triangles is None else f"the {max_triangles} triangles that are allowed"
-    return f"the target {target:g} is missed even with {allowed} ({score}); ask for less, or allow more"
+    if outcome.texture is not None:
+        allowed = "the textures as they are"
+    return f"the target {target:g} is missed even with {allowed}{kind} ({score}); {remedy}"
 
 
-def _table(reduced: Reduced) -> str:
-    """The path of every search, then what was found."""
+def _table(reduced: Reduced, saved: Sequence[str | None]) -> str:
+    """The path of every search, then what was found and where it was written."""
     rows = []
-    for outcome in reduced.outcomes:
+    for outcome, path in zip(reduced.outcomes, saved, strict=True):
         for found in (outcome.geometry, outcome.texture):
             if found is None:
                 continue
             rows += [(f"{found.target:g}", *_cells(step), "fast" if step.quick else "") for step in found.path]
-            rows.append((f"{found.target:g}", *_cells(found.best), "found" if found.reached else "missed"))
+            verdict = "found" if found.reached else "missed"
+            if path is not None and found is outcome.last:
+                verdict += f", written to {path}"
+            rows.append((f"{found.target:g}", *_cells(found.best), verdict))
     rows.insert(0, ("target", "ratio", "triangles", "texture", "FMQM", ""))
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     return "".join(
         "  ".join(cell.rjust(width) for cell, width in zip(row[:-1], widths, strict=False))
-        + f"  {row[-1]}".rstrip()
+        + f"  {one_line(row[-1])}".rstrip()
         + "\n"
         for row in rows
     )
@@ -186,15 +213,15 @@ def _cells(step: Step) -> tuple[str, str, str, str]:
     return f"{step.version.ratio:.4f}", str(step.triangles), texture, "-" if step.fmqm is None else f"{step.fmqm:.4f}"
 
 
-def _json_text(reference: str, settings: Settings, reduced: Reduced) -> str:
+def _json_text(reference: str, settings: Settings, reduced: Reduced, saved: Sequence[str | None]) -> str:
     document = {
         "reference": reference,
         "triangles": reduced.triangles,
         "settings": settings.as_dict(),
         "warnings": list(reduced.warnings),
         "found": [
-            {"geometry": _found_dict(outcome.geometry), "texture": _found_dict(outcome.texture)}
-            for outcome in reduced.outcomes
+            {"geometry": _found_dict(outcome.geometry), "texture": _found_dict(outcome.texture), "file": path}
+            for outcome, path in zip(reduced.outcomes, saved, strict=True)
         ],
     }
     return json.dumps(document, indent=2, allow_nan=False) + "\n"

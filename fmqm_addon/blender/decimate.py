@@ -2,7 +2,8 @@
 """The cheapest version of an asset whose FMQM stays at or above a target, found by bisection, in steps.
 
 All versions are scored on the same samples of the same reference, so that their differences are the meshes' and not
-chance. Most are scored with few patches; the one that is chosen, and the next cheaper one, with all of them.
+chance. Most are scored with few patches; the one that is chosen, and the next cheaper one, with all of them and, where
+a file is wanted, as that file holds them.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..metric.errors import FMQMError, MeshError
+from ..metric.errors import FMQMError, MeshError, SettingsError
 from ..metric.score import COLUMNS, Progress, Stepper, Work, as_part
 from ..metric.settings import FAST_SCORED_PATCHES, Settings
 from ..metric.surface import MeshArrays, weld
@@ -53,7 +54,7 @@ class Step:
     """A version that was scored.
 
     Attributes:
-        quick: with few patches; such scores only lead to those that count.
+        quick: with few patches, or not as the file holds it; such scores only lead to those that count.
         fmqm: in [0, 1]; None: nothing was left that could be measured.
     """
 
@@ -89,13 +90,15 @@ class Search:
     Args:
         read: the arrays of a version, always in the same frame; raises MeshError where nothing is left of it.
         settings: that decide. While searching only FAST_SCORED_PATCHES of the patches are scored.
+        written: the arrays of a version as its file holds them, in the same frame; these decide. None: no file.
     """
 
-    def __init__(self, read: Reader, settings: Settings) -> None:
+    def __init__(self, read: Reader, settings: Settings, written: Reader | None = None) -> None:
         few = replace(settings, scored_patches=min(settings.scored_patches or settings.patches, FAST_SCORED_PATCHES))
-        self._read = read
-        self._settings = {False: settings, True: few}
-        self._two_rounds = few.scored_patches != (settings.scored_patches or settings.patches)
+        self._read = {True: read, False: written or read}
+        self._settings = {True: few, False: settings}
+        self._same_settings = few.scored_patches == (settings.scored_patches or settings.patches)
+        self._two_rounds = written is not None or not self._same_settings
         self._measurements: dict[bool, Measurement] = {}
         self._steps: dict[tuple[bool, Version], Step] = {}
         self.triangles = 0  # of the asset as it is; this and its warnings after preparing
@@ -104,24 +107,19 @@ class Search:
     def prepare(self) -> Work[None]:
         """Raises MeshError where the asset cannot be measured."""
         yield Progress("Reading", 0.0)
-        asset = self._read(Version())
+        asset = self._read[True](Version())
         self.triangles = len(asset.triangles)
-        rounds = (True, False) if self._two_rounds else (False,)
+        rounds = (False,) if self._same_settings else (True, False)
         for number, quick in enumerate(rounds):
             measurement = Measurement(asset, self._settings[quick])
             yield from as_part(measurement.prepare(), number / len(rounds), 1 / len(rounds), "Preparing")
             self._measurements[quick] = measurement
+        self._measurements.setdefault(True, measurement)
         self.warnings = self._measurements[False].reference.warnings
 
     def ratios(self, max_triangles: int | None = None) -> list[Version]:
-        """Versions with fewer and fewer triangles: TOLERANCE apart, or one triangle where that is more.
-
-        Raises:
-            MeshError: max_triangles is below LEAST_TRIANGLES.
-        """
+        """Versions with fewer and fewer triangles: TOLERANCE apart, or one triangle where that is more."""
         most = min(self.triangles, max_triangles or self.triangles)
-        if max_triangles is not None and max_triangles < LEAST_TRIANGLES:
-            raise MeshError(f"max-triangles is {max_triangles}; at least {LEAST_TRIANGLES} are wanted")
         counts = [most]
         while (fewer := min(counts[-1] - 1, round(counts[-1] * (1 - TOLERANCE)))) >= LEAST_TRIANGLES:
             counts.append(fewer)
@@ -141,7 +139,7 @@ class Search:
         def exceeds(index: int) -> Work[bool]:
             yield Progress("Counting triangles", 0.0)
             try:
-                return len(self._read(versions[index]).triangles) > max_triangles
+                return len(self._read[True](versions[index]).triangles) > max_triangles
             except MeshError:
                 return False  # nothing is left of it
 
@@ -185,7 +183,7 @@ class Search:
         yield Progress(what, done)
         triangles, fmqm = 0, None
         try:
-            mesh = self._read(version)
+            mesh = self._read[quick](version)
             triangles = len(mesh.triangles)
             comparing = self._measurements[quick].compare(mesh)
             compared = yield from as_part(comparing, done, (1 - done) * _PER_STEP, what)
@@ -225,15 +223,22 @@ class Wish:
 
     Attributes:
         targets: FMQM that decimated versions must keep; empty: the triangles stay as they are.
-        max_triangles: that no version may exceed; None: as many as the asset has.
+        max_triangles: that no version may exceed, at least LEAST_TRIANGLES; None: as many as the asset has.
         texture_target: FMQM that each of them must still keep with smaller textures; None: these stay as they are.
         texture_sizes: longest sides of the color images, falling, the first the present one.
+
+    Raises:
+        SettingsError: max_triangles is too small.
     """
 
     targets: tuple[float, ...] = ()
     max_triangles: int | None = None
     texture_target: float | None = None
     texture_sizes: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.max_triangles is not None and self.max_triangles < LEAST_TRIANGLES:
+            raise SettingsError(f"max-triangles is {self.max_triangles}; at least {LEAST_TRIANGLES} are wanted")
 
 
 @dataclass(frozen=True)
@@ -264,13 +269,16 @@ class Reduced:
     warnings: tuple[str, ...]
 
 
-def reducing(read: Reader, wish: Wish, settings: Settings) -> Stepper[Reduced]:
-    """Searches what is wished for; its steps raise what read, Measurement, Search.ratios and Search.within raise."""
-    return Stepper(_reducing(read, wish, settings))
+def reducing(read: Reader, wish: Wish, settings: Settings, written: Reader | None = None) -> Stepper[Reduced]:
+    """Searches what is wished for; its steps raise what the readers, Measurement and Search.within raise.
+
+    Args:
+        read, settings, written: as for Search.
+    """
+    return Stepper(_reducing(Search(read, settings, written), wish))
 
 
-def _reducing(read: Reader, wish: Wish, settings: Settings) -> Work[Reduced]:
-    search = Search(read, settings)
+def _reducing(search: Search, wish: Wish) -> Work[Reduced]:
     yield from part(search.prepare(), 0.0, _PREPARED)
     ratios = search.ratios(wish.max_triangles)
     if wish.max_triangles is not None:

@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
-from contextlib import redirect_stderr
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stderr
 from dataclasses import replace
 from io import StringIO
 from pathlib import Path
@@ -23,7 +24,7 @@ from .remarks import left_out
 from .snapshot import placed
 from .space import Placed
 from .spec import SUFFIXES, split_spec
-from .truncated import check_alembic, check_ply, check_usd
+from .truncated import check_alembic, check_beside, check_ply, check_usd
 
 
 def load_mesh(spec: str, reading: Reading = AS_FOUND) -> MeshArrays:
@@ -46,12 +47,13 @@ def load_placed(spec: str, reading: Reading = AS_FOUND, announce: Callable[[str]
     """
     path, object_name = split_spec(spec)
     try:
-        open_file(path)
+        unresolved = open_file(path)
         objects = [_named(object_name, path)] if object_name else scene_members()
         try:
+            remarks = (*unresolved, *left_out(path, reading.texture is None))
             if not objects:
-                raise MeshError("no mesh in it; a surface is wanted")
-            remarks = left_out(path, reading.texture is None)
+                why = f" ({'; '.join(remarks)})" if remarks else ""
+                raise MeshError(f"no mesh in it; a surface is wanted{why}")
             name, cache = object_name or Path(path).name, TextureCache()
             baked = to_bake(objects, reading, cache)
             if baked:
@@ -65,8 +67,11 @@ def load_placed(spec: str, reading: Reading = AS_FOUND, announce: Callable[[str]
         _clear_session()
 
 
-def open_file(path: str) -> None:
+def open_file(path: str) -> tuple[str, ...]:
     """Opens or imports a file into an emptied session.
+
+    Returns:
+        What it refers to and Blender cannot find, as far as that must be asked before.
 
     Raises:
         FileError: the file is missing, unreadable or of an unknown kind.
@@ -79,16 +84,18 @@ def open_file(path: str) -> None:
         raise FileError(f"{path}: {what}")
     if not os.access(path, os.R_OK):
         raise FileError(f"{path}: permission denied; the file cannot be read")
-    if suffix in _CHECKS:
-        _CHECKS[suffix](path)
+    check_beside(path)
+    unresolved = _CHECKS[suffix](path) if suffix in _CHECKS else ()
     _clear_session()
     try:
-        with redirect_stderr(StringIO()):  # Blender prints the tracebacks of importers written in Python
+        # Blender prints the tracebacks of importers written in Python, and each folder where it looks for an image.
+        with redirect_stderr(StringIO()), _silent(suffix in _NOISY):
             _open(os.path.abspath(path), suffix)
     except RuntimeError as error:
-        raise FileError(f"{path}: {_last_line(error)}; check the file, or export it again") from error
+        raise FileError(f"{path}: {last_line(error)}; check the file, or export it again") from error
     except UnicodeEncodeError as error:
         raise FileError(f"{path}: Blender takes only names in UTF-8; rename the file or its folder") from error
+    return unresolved
 
 
 def chains_of_file(path: str) -> list[tuple[str, list[tuple[int, str]]]]:
@@ -109,6 +116,26 @@ def chains_of_file(path: str) -> list[tuple[str, list[tuple[int, str]]]]:
 
 def _clear_session() -> None:
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+
+
+@contextmanager
+def _silent(silent: bool) -> Iterator[None]:
+    """Lets nothing through to the process's standard error, not even from C."""
+    try:
+        kept = os.dup(2) if silent else None
+    except OSError:
+        kept = None  # it is closed
+    if kept is None:
+        yield
+        return
+    sys.stderr.flush()
+    try:
+        with open(os.devnull, "wb") as nowhere:
+            os.dup2(nowhere.fileno(), 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
 
 
 def _open(path: str, suffix: str) -> None:
@@ -143,7 +170,8 @@ _IMPORTERS: dict[str, Callable[[], bpy.types.Operator]] = {
 }
 # These importers do not mend meshes unless told to, and Blender would read beyond the ends of their arrays.
 _OPTIONS = dict.fromkeys((".usd", ".usda", ".usdc", ".usdz", ".abc"), {"validate_meshes": True})
-_CHECKS = {".abc": check_alembic, ".ply": check_ply}
+_NOISY = {".fbx", ".obj"}
+_CHECKS: dict[str, Callable[[str], tuple[str, ...]]] = {".abc": check_alembic, ".ply": check_ply}
 _CHECKS |= dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), check_usd)
 
 
@@ -158,11 +186,11 @@ def _named(name: str, path: str) -> bpy.types.Object:
     return found
 
 
-def _last_line(error: RuntimeError) -> str:
+def last_line(error: RuntimeError, program: str = "the importer") -> str:
     """Operators put a report, or a whole traceback, into the error; its last line says what happened."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip() and not line.startswith("Location:")]
     if not lines:
-        return "the importer failed without saying why"
+        return f"{program} failed without saying why"
     if any(line.endswith("Traceback (most recent call last):") for line in lines):
-        return f"the importer broke off ({lines[-1]})"
+        return f"{program} broke off ({lines[-1]})"
     return lines[-1].removeprefix("Error: ").rstrip(".")

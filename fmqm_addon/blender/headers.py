@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
+import os
 import struct
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import BinaryIO
 
 
@@ -22,12 +23,21 @@ DEFAULT_LIMITS = Limits()
 
 @dataclass(frozen=True)
 class Header:
-    """Width and height in pixels, whether Blender decodes the file to floats, and whether it is a two-channel PNG."""
+    """What a file promises.
+
+    Attributes:
+        width: in pixels.
+        height: in pixels.
+        is_float: whether Blender decodes it to floats.
+        is_grey_with_alpha: it has these two channels (told of PNG, TIFF, TGA and JPEG 2000).
+        kind: of file, such as "png"; it does not count where headers are compared.
+    """
 
     width: int
     height: int
     is_float: bool = False
     is_grey_with_alpha: bool = False
+    kind: str = field(default="", compare=False)
 
     @property
     def decoded(self) -> int:
@@ -36,7 +46,9 @@ class Header:
 
 
 def file_header(path: str) -> Header | None:
-    """The header of the file at a path; None also where it cannot be opened."""
+    """The header of the file at a path; None also where it cannot be opened, or is a pipe or a device."""
+    if not os.path.isfile(path):
+        return None
     try:
         with open(path, "rb") as file:
             return read_header(file)
@@ -47,19 +59,19 @@ def file_header(path: str) -> Header | None:
 def read_header(file: BinaryIO) -> Header | None:
     """The header of a seekable file at its beginning; None where it is of no known kind, broken or empty."""
     start = file.read(64)
-    for magic, at, read in _READERS:
+    for magic, at, kind, read in _READERS:
         if start[at : at + len(magic)] == magic:
-            return _sane(read, file)
-    return _sane(_tga, file)  # the only kind without a magic number
+            return _sane(kind, read, file)
+    return _sane("tga", _tga, file)  # the only kind without a magic number
 
 
-def _sane(read: Callable[[BinaryIO], Header | None], file: BinaryIO) -> Header | None:
+def _sane(kind: str, read: Callable[[BinaryIO], Header | None], file: BinaryIO) -> Header | None:
     file.seek(0)
     try:
         found = read(file)
     except (struct.error, ValueError, OverflowError):  # it ends too early, or its numbers are no numbers
         return None
-    return found if found is not None and found.width > 0 and found.height > 0 else None
+    return replace(found, kind=kind) if found is not None and found.width > 0 and found.height > 0 else None
 
 
 def _unpack(layout: str, file: BinaryIO, at: int | None = None) -> tuple[int, ...]:
@@ -116,13 +128,13 @@ def _tiff(file: BinaryIO) -> Header:
     big = version == 43
     (directory,) = _unpack(order + ("Q" if big else "I"), file, 8 if big else 4)
     (count,) = _unpack(order + ("Q" if big else "H"), file, directory)
-    values = {256: 0, 257: 0, 258: 8}  # width, height, bits of a sample
+    values = {256: 0, 257: 0, 258: 8, 277: 1}  # width, height, bits of a sample, samples of a pixel
     for _ in range(min(count, 1000)):
         tag, kind, number = _unpack(order + ("HHQ" if big else "HHI"), file)
         field = file.read(8 if big else 4)
         if tag in values:
             values[tag] = _tiff_value(order, kind, number, field, file)
-    return Header(values[256], values[257], values[258] > 8)
+    return Header(values[256], values[257], values[258] > 8, values[277] == 2)
 
 
 def _tiff_value(order: str, kind: int, number: int, field: bytes, file: BinaryIO) -> int:
@@ -189,15 +201,15 @@ def _jp2(file: BinaryIO) -> Header | None:
     at = start.find(b"ihdr")
     if at < 0:
         return None
-    height, width, _, depth = struct.unpack_from(">IIHB", start, at + 4)
-    return Header(width, height, (depth & 0x7F) + 1 > 8)
+    height, width, channels, depth = struct.unpack_from(">IIHB", start, at + 4)
+    return Header(width, height, (depth & 0x7F) + 1 > 8, channels == 2)
 
 
 def _j2k(file: BinaryIO) -> Header:
     """The bare stream: its SIZ segment is the first."""
     right, bottom, left, top = _unpack(">4I", file, 8)
-    (depth,) = _unpack(">B", file, 42)
-    return Header(right - left, bottom - top, (depth & 0x7F) + 1 > 8)
+    channels, depth = _unpack(">HB", file, 40)
+    return Header(right - left, bottom - top, (depth & 0x7F) + 1 > 8, channels == 2)
 
 
 def _sgi(file: BinaryIO) -> Header:
@@ -222,27 +234,27 @@ def _tga(file: BinaryIO) -> Header | None:
     colors, kind = _unpack("<xBB", file)
     width, height, depth = _unpack("<HHB", file, 12)
     known = colors in (0, 1) and kind in (1, 2, 3, 9, 10, 11) and depth in (8, 15, 16, 24, 32)
-    return Header(width, height) if known else None
+    return Header(width, height, is_grey_with_alpha=kind in (3, 11) and depth == 16) if known else None
 
 
-_READERS: tuple[tuple[bytes, int, Callable[[BinaryIO], Header | None]], ...] = (
-    (b"\x89PNG\r\n\x1a\n", 0, _png),
-    (b"\xff\xd8\xff", 0, _jpeg),
-    (b"WEBP", 8, _webp),
-    (b"BM", 0, _bmp),
-    (b"II*\0", 0, _tiff),
-    (b"MM\0*", 0, _tiff),
-    (b"II+\0", 0, _tiff),
-    (b"MM\0+", 0, _tiff),
-    (b"\x76\x2f\x31\x01", 0, _exr),
-    (b"#?", 0, _hdr),
-    (b"8BPS", 0, _psd),
-    (b"DDS ", 0, _dds),
-    (b"\0\0\0\x0cjP  ", 0, _jp2),
-    (b"\xff\x4f\xff\x51", 0, _j2k),
-    (b"\x01\xda", 0, _sgi),
-    (b"SDPX", 0, _dpx),
-    (b"XPDS", 0, _dpx),
-    (b"\x80\x2a\x5f\xd7", 0, _cineon),
-    (b"\xd7\x5f\x2a\x80", 0, _cineon),
+_READERS: tuple[tuple[bytes, int, str, Callable[[BinaryIO], Header | None]], ...] = (
+    (b"\x89PNG\r\n\x1a\n", 0, "png", _png),
+    (b"\xff\xd8\xff", 0, "jpeg", _jpeg),
+    (b"WEBP", 8, "webp", _webp),
+    (b"BM", 0, "bmp", _bmp),
+    (b"II*\0", 0, "tiff", _tiff),
+    (b"MM\0*", 0, "tiff", _tiff),
+    (b"II+\0", 0, "tiff", _tiff),
+    (b"MM\0+", 0, "tiff", _tiff),
+    (b"\x76\x2f\x31\x01", 0, "exr", _exr),
+    (b"#?", 0, "hdr", _hdr),
+    (b"8BPS", 0, "psd", _psd),
+    (b"DDS ", 0, "dds", _dds),
+    (b"\0\0\0\x0cjP  ", 0, "jp2", _jp2),
+    (b"\xff\x4f\xff\x51", 0, "jp2", _j2k),
+    (b"\x01\xda", 0, "sgi", _sgi),
+    (b"SDPX", 0, "dpx", _dpx),
+    (b"XPDS", 0, "dpx", _dpx),
+    (b"\x80\x2a\x5f\xd7", 0, "cineon", _cineon),
+    (b"\xd7\x5f\x2a\x80", 0, "cineon", _cineon),
 )

@@ -23,6 +23,9 @@ from .headers import DEFAULT_LIMITS, Header, Limits, file_header, read_header
 LINEAR_SPACES = frozenset({"Non-Color", "Linear Rec.709", "scene_linear"})
 BRIGHTEST = 1e6  # linear light in float images is kept within this, so that nothing made of it overflows
 _LIGHT_FORMATS = frozenset({"OPEN_EXR", "OPEN_EXR_MULTILAYER", "HDR", "DPX", "CINEON"})  # hold linear light
+_IS_OLD = bpy.app.version < (5, 2)
+_ODD_KINDS = frozenset({"bmp", "jp2", "sgi", "webp"})  # whose colors an old Cycles does not multiply by alpha
+CRASHES = "Blender before 5.2 crashes at a JPEG 2000 image of grey and alpha; save it as a PNG"
 _BLOCK = 2**18  # floats that are converted at a time: what a processor's cache holds
 
 
@@ -157,8 +160,9 @@ def _byte_pixels(image: bpy.types.Image, values: NDArray[np.float32]) -> Pixels:
         if associated:  # rounded down, as Cycles does
             color = upwards[rows, :, :3]
             color[...] = color.astype(np.uint16) * block[:, :, 3:] // 255
-    grey = associated and not image.packed_file and _is_grey_with_alpha(image)
-    unusual = associated and (image.alpha_mode == "PREMUL" or grey)
+    from_file = associated and image.source == "FILE" and not (image.packed_file or image.is_dirty)
+    odd = from_file and _has_odd_alpha(image)
+    unusual = associated and (image.alpha_mode == "PREMUL" or odd)
     return Pixels(result, linear=is_linear(image), associated=associated, unusual=unusual)
 
 
@@ -176,6 +180,11 @@ def _row_blocks(values: NDArray[Any]) -> list[slice]:
     return [slice(first, first + step) for first in range(0, height, step)]
 
 
+def is_black(pixels: Pixels) -> bool:
+    """Whether an image shows nothing but black, as those do that Blender cannot decode and calls loaded."""
+    return not any(pixels.values[rows, :, :3].any() for rows in _row_blocks(pixels.values))
+
+
 def is_linear(image: bpy.types.Image) -> bool:
     """Whether the values of a byte image are linear light."""
     return image.colorspace_settings.is_data or image.colorspace_settings.name in LINEAR_SPACES
@@ -186,9 +195,10 @@ def _associates(image: bpy.types.Image) -> bool:
     return not image.colorspace_settings.is_data and image.alpha_mode in {"STRAIGHT", "PREMUL"}
 
 
-def _is_grey_with_alpha(image: bpy.types.Image) -> bool:
+def _has_odd_alpha(image: bpy.types.Image) -> bool:
+    """Whether Cycles does not multiply the colors of an image's file by alpha where it does those of others."""
     header = image_header(image)
-    return header is not None and header.is_grey_with_alpha
+    return header is not None and (header.is_grey_with_alpha or (_IS_OLD and header.kind in _ODD_KINDS))
 
 
 def read_tile(image: bpy.types.Image, number: int, limits: Limits = DEFAULT_LIMITS) -> Pixels | None:
@@ -210,7 +220,7 @@ def _tile_image(image: bpy.types.Image, number: int) -> Iterator[bpy.types.Image
         own = bpy.data.images.new("FMQM tile", 1, 1)
         own.pack(data=packed.data, data_len=len(packed.data))
         own.source = "FILE"
-    elif os.path.isfile(path) and os.access(path, os.R_OK):
+    elif os.path.isfile(path) and os.access(path, os.R_OK) and not crashes(file_header(path)):
         own = bpy.data.images.load(path, check_existing=False)
     else:
         yield None
@@ -233,6 +243,25 @@ def image_path(image: bpy.types.Image) -> str:
     return os.path.normpath(path)
 
 
+def image_paths(image: bpy.types.Image) -> list[str]:
+    """The absolute paths of an image's files: of a UDIM set's tiles, of others one."""
+    if image.source == "TILED":
+        return [tile_path(image, tile.number) for tile in image.tiles]
+    return [image_path(image)]
+
+
+def same_content(one: bpy.types.Image, other: bpy.types.Image) -> bool:
+    """Whether Cycles takes two images for one: read from one file in one way."""
+    if one == other or other is None:
+        return one == other
+
+    def way(image: bpy.types.Image) -> tuple[str, ...]:
+        return image_path(image), image.source, image.colorspace_settings.name, image.alpha_mode
+
+    held = any(each.packed_file or each.is_dirty or each.source == "GENERATED" for each in (one, other))
+    return not held and way(one) == way(other)
+
+
 def tile_path(image: bpy.types.Image, number: int) -> str:
     """The absolute path of a tile's file, after Blender's two ways to number them."""
     column, row = tile_place(number)
@@ -248,24 +277,37 @@ def tile_place(number: int) -> tuple[int, int]:
 def why_unread(image: bpy.types.Image) -> str:
     """Which image could not be read and what is wrong with it, for messages."""
     path = image_path(image)
-    here = os.path.exists(path) or image.packed_file is not None
-    return f"{path or image.name}: the base-color image " + (
-        "is broken or of a kind that Blender cannot read" if here else "is missing"
-    )
+    what = "is broken or of a kind that Blender cannot read"
+    if image.packed_file is None and not os.path.exists(path):
+        what = "is missing"
+    elif "\\" in path and os.sep == "/":
+        what = "has a backslash in its name, which Blender takes for a slash"
+    return f"{path or image.name}: the base-color image {what}"
 
 
 def check_limits(image: bpy.types.Image, limits: Limits) -> None:
     """Refuses an image before anything decodes it.
 
     Raises:
-        MeshError: its header promises more than the limits.
+        MeshError: its header promises more than the limits, or Blender would crash, or wait for ever, at its file.
     """
+    if not image.packed_files:
+        for path in image_paths(image):
+            if os.path.exists(path) and not (os.path.isfile(path) or os.path.isdir(path)):
+                raise MeshError(f"{path}: the image is a pipe or a device; a file is wanted")
     header = image_header(image)
     if header is not None:
         _check(header, image_path(image) or image.name, limits)
 
 
+def crashes(header: Header | None) -> bool:
+    """Whether this Blender crashes as soon as it loads an image with such a header."""
+    return _IS_OLD and header is not None and header.kind == "jp2" and header.is_grey_with_alpha
+
+
 def _check(header: Header, name: str, limits: Limits) -> None:
+    if crashes(header):
+        raise MeshError(f"{name}: {CRASHES}")
     size = f"{header.width} x {header.height} pixels"
     if max(header.width, header.height) > limits.side:
         raise MeshError(f"{name}: the image promises {size}, more than {limits.side} a side; see --max-image-side")
@@ -326,12 +368,14 @@ def _blocks(image: bpy.types.Image) -> Iterator[bytes]:
     if packed:
         yield from packed
         return
-    tiled = image.source == "TILED"
-    for path in [tile_path(image, tile.number) for tile in image.tiles] if tiled else [image_path(image)]:
+    for path in image_paths(image):
         if os.path.isfile(path) and os.access(path, os.R_OK):
-            with open(path, "rb") as file:
-                while block := file.read(2**20):
-                    yield block
+            try:
+                with open(path, "rb") as file:
+                    while block := file.read(2**20):
+                        yield block
+            except OSError as error:
+                raise MeshError(f"{path}: the image cannot be read ({error.strerror})") from error
 
 
 def load_texture(path: str, limits: Limits = DEFAULT_LIMITS) -> Texture:
@@ -343,6 +387,8 @@ def load_texture(path: str, limits: Limits = DEFAULT_LIMITS) -> Texture:
     """
     if not os.path.isfile(path):
         raise FileError(f"{path}: no such image file")
+    if crashes(file_header(path)):
+        raise FileError(f"{path}: {CRASHES}")
     try:
         image = bpy.data.images.load(path, check_existing=False)
     except RuntimeError as error:

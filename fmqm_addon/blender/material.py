@@ -43,6 +43,7 @@ def _read_look(material: bpy.types.Material | None, cache: TextureCache, reading
     surface = surface_of(material)
     if surface is None:
         why = "has no shader" if uses_nodes(material) else "does not use nodes"
+        why = "is missing from its library" if material.original.is_missing else why
         return plain_look(material, f"material {material.name} {why}; its viewport color is taken")
     if node_count(material.node_tree) > MOST_NODES:
         raise MeshError(

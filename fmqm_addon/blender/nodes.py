@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from math import inf
 from typing import Any
@@ -40,12 +40,12 @@ class Place:
         return source(Place(self.node.inputs[name], self.groups))
 
 
-def outputs(material: bpy.types.Material) -> list[Place]:
-    """What feeds the active output: its surface and its displacement, where something does."""
+def outputs(material: bpy.types.Material, names: Iterable[str] = ("Surface", "Displacement")) -> list[Place]:
+    """What feeds the active output: of these inputs, those that something feeds."""
     output = active_output(material.node_tree) if uses_nodes(material) else None
     if output is None:
         return []
-    return [Place(output.inputs[name]) for name in ("Surface", "Displacement") if _link(output.inputs[name])]
+    return [Place(output.inputs[name]) for name in names if _link(output.inputs[name])]
 
 
 def active_output(tree: bpy.types.NodeTree) -> bpy.types.Node | None:
@@ -149,8 +149,14 @@ def upstream(start: Place) -> Iterator[tuple[bpy.types.Node, str]]:
         yield place.node, role
 
 
-def upstream_outputs(start: Place) -> Iterator[tuple[Place, str]]:
-    """Every output that an input depends on, with its role."""
+def upstream_outputs(
+    start: Place, dropped: Callable[[Place], Iterable[bpy.types.NodeSocket]] = lambda _: ()
+) -> Iterator[tuple[Place, str]]:
+    """Every output that an input depends on, with its role.
+
+    Args:
+        dropped: of an output, the inputs of its node that are not followed.
+    """
     queue, seen = [(start, start.socket.name)], set()
     while queue:
         asking, role = queue.pop(0)
@@ -163,7 +169,10 @@ def upstream_outputs(start: Place) -> Iterator[tuple[Place, str]]:
             continue
         seen.add(key)
         yield place, role
+        idle = set(dropped(place))
         for socket in place.node.inputs:
+            if socket in idle:
+                continue
             own = place.socket.type == "SHADER" and socket.type != "SHADER"
             queue.append((Place(socket, place.groups), _role(socket) if own else role))
 

@@ -6,6 +6,7 @@ Nothing here guesses: what is read is what Cycles shows, which the tests hold ag
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from math import isfinite
 
@@ -42,9 +43,22 @@ from ..metric.color import (
     encode_srgb,
 )
 from ..metric.errors import MeshError
-from .images import BRIGHTEST, LINEAR_SPACES, Pixels, TextureCache, check_limits, tile_path, tile_place, why_unread
+from .images import (
+    BRIGHTEST,
+    LINEAR_SPACES,
+    Pixels,
+    TextureCache,
+    check_limits,
+    image_path,
+    is_black,
+    same_content,
+    tile_path,
+    tile_place,
+    why_unread,
+)
 from .looks import Layer, Reading
-from .nodes import NotReadError, Place, by_identifier, family, only_shines, outputs, source, upstream, upstream_outputs
+from .nodes import NotReadError, Place, by_identifier, family, only_shines, source, upstream
+from .simplified import merged, used_alphas
 
 MOST_NODES = 200  # of what feeds a base color; read trees are evaluated recursively
 _EXTENSIONS: dict[str, Extension] = {"REPEAT": "repeat", "EXTEND": "extend", "CLIP": "clip", "MIRROR": "mirror"}
@@ -101,8 +115,7 @@ class Reader:
         self._reading = reading
         self._nodes = 0
         self._in_alpha = False
-        used = (place for start in outputs(material) for place, _ in upstream_outputs(start))
-        self._alpha_used = {place.node for place in used if place.socket.name == "Alpha"}
+        self._used_alphas = used_alphas(material)
 
     def look(self) -> tuple[Color, Alpha | None]:
         """The material's color and opacity.
@@ -254,8 +267,7 @@ class Reader:
                 continue
             if node.image is not None:
                 check_limits(node.image, self._reading.limits)
-            has_pixels = node.image is not None and (node.image.size[0] or node.image.type == "MULTILAYER")
-            if role == "base color" and not has_pixels:
+            if role == "base color" and not _has_pixels(node.image):
                 self._missing(node)
 
     def _missing(self, node: bpy.types.Node) -> Light:
@@ -317,18 +329,28 @@ class Reader:
             raise NotReadError(node, f"shows a {image.source.lower()}")
         known = len(self.layers)
         placement = self._placement(place.input("Vector"))
-        texture = self._tiles(node, placement) if image.source == "TILED" else self._whole(node, placement)
+        texture = self._tiles(place, placement) if image.source == "TILED" else self._whole(place, placement)
         if texture is None:
             del self.layers[known:]
         return texture
 
-    def _whole(self, node: bpy.types.Node, placement: Placement) -> Texture | None:
+    def _whole(self, place: Place, placement: Placement) -> Texture | None:
+        node = place.node
         pixels = self._cache.pixels(node.image, self._reading.limits)
         if pixels is None and node.image.type == "MULTILAYER":  # Cycles reads its first layer, Python none
             raise NotReadError(node, "has an image of several layers")
-        return None if pixels is None else self._sampler(node, pixels, placement)
+        if pixels is None:
+            return None
+        texture = self._sampler(place, pixels, placement)
+        if node.image.source == "FILE" and not self._in_alpha and is_black(pixels):
+            self.warnings.append(
+                f"material {self._name}: {image_path(node.image) or node.image.name} is black all over; unless it is "
+                "meant to be, Blender could not decode it: save it as a PNG"
+            )
+        return texture
 
-    def _sampler(self, node: bpy.types.Node, pixels: Pixels, placement: Placement) -> Texture:
+    def _sampler(self, place: Place, pixels: Pixels, placement: Placement) -> Texture:
+        node = place.node
         if pixels.values.dtype == np.uint8 and node.image.colorspace_settings.name not in LINEAR_SPACES | {"sRGB"}:
             raise NotReadError(node, f"has an image in the color space {node.image.colorspace_settings.name}")
         if pixels.unusual:
@@ -338,12 +360,21 @@ class Reader:
             extension=_EXTENSIONS[node.extension],
             interpolation=_INTERPOLATIONS[node.interpolation],
             linear=pixels.linear,
-            unassociate=pixels.associated and node in self._alpha_used,
+            unassociate=pixels.associated and self._uses_alpha(place),
             placement=placement,
         )
 
-    def _tiles(self, node: bpy.types.Node, placement: Placement) -> Tiles | None:
-        image = node.image
+    def _uses_alpha(self, place: Place) -> bool:
+        """Whether Cycles, which makes one node of equal ones, divides the color at an image's output by its alpha."""
+        return any(
+            same_content(place.node.image, other.node.image)
+            and not _is_mapped(other.node.texture_mapping)
+            and merged(place, other)
+            for other in self._used_alphas
+        )
+
+    def _tiles(self, place: Place, placement: Placement) -> Tiles | None:
+        node, image = place.node, place.node.image
         if image.is_dirty:
             raise NotReadError(node, "has tiles with unsaved changes")
         tiles, missing = [], []
@@ -352,7 +383,7 @@ class Reader:
             if pixels is None:
                 missing.append(tile.number)
             else:
-                tiles.append((tile_place(tile.number), self._sampler(node, pixels, Placement())))
+                tiles.append((tile_place(tile.number), self._sampler(place, pixels, Placement())))
         if tiles:
             self.warnings += [
                 f"material {self._name}: {tile_path(image, number)}, a tile of its image, is missing or broken; "
@@ -443,6 +474,15 @@ class Reader:
         if not isinstance(light, PlainLight):
             raise NotReadError(node, "has an input that varies")
         return light.rgb
+
+
+def _has_pixels(image: bpy.types.Image | None) -> bool:
+    """Whether Cycles, as far as is known before it bakes, has something to show of an image."""
+    if image is None:
+        return False
+    if image.source == "SEQUENCE":  # of which Blender tells no size
+        return os.path.isfile(image_path(image)) or image.packed_file is not None
+    return bool(image.size[0]) or image.type == "MULTILAYER"
 
 
 def _is_mapped(mapping: bpy.types.TexMapping) -> bool:

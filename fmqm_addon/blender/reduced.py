@@ -6,16 +6,19 @@ from __future__ import annotations
 import os
 import re
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, redirect_stderr
+from io import StringIO
 from pathlib import Path
 
 import bpy
 
-from ..metric.errors import FileError, MeshError
+from ..metric.errors import FileError, FMQMError, MeshError, SettingsError
 from ..metric.surface import MeshArrays
-from .assets import scene_members
+from .assets import instanced, scene_members
 from .decimate import Reader, Version, add_modifiers, scene_reader
-from .files import open_file
+from .files import last_line, load_mesh, open_file
+from .plain import ancestors, make_plain
 from .spec import split_spec
 
 NOT_COLOR = "Non-Color"
@@ -27,7 +30,7 @@ def open_asset(spec: str) -> list[bpy.types.Object]:
 
     Raises:
         FileError: it cannot be opened, or has no such object.
-        MeshError: there is no mesh in it.
+        MeshError: there is no mesh in it that could be decimated.
     """
     path, name = split_spec(spec)
     open_file(path)
@@ -35,7 +38,9 @@ def open_asset(spec: str) -> list[bpy.types.Object]:
         raise FileError(f"{path}: no object named {name} in it")
     objects = [bpy.data.objects[name]] if name else scene_members()
     if not any(object_.type == "MESH" for object_ in objects):
-        raise MeshError(f"{spec}: no mesh in it; a surface is wanted")
+        if any(instanced(object_) for object_ in objects):
+            raise MeshError(f"{spec}: it shows only instances; make them real (Object > Apply > Make Instances Real)")
+        raise MeshError(f"{spec}: no mesh in it; a mesh is wanted, since nothing else can be decimated")
     return objects
 
 
@@ -46,7 +51,7 @@ def file_reader(spec: str) -> Reader:
 
     def read(version: Version) -> MeshArrays:
         nonlocal names, opened
-        if version.texture != opened:
+        if version.texture != opened or not bpy.data.objects:  # reading back what was written leaves nothing open
             objects = open_asset(spec)
             names, opened = [object_.name_full for object_ in objects], version.texture
             shrink_textures(objects, version.texture)
@@ -83,67 +88,163 @@ def shrink_textures(objects: list[bpy.types.Object], size: int | None) -> None:
             image.pack()
 
 
-def save_version(spec: str, version: Version, path: str) -> None:
-    """Opens a file, reduces what is measured of it, and saves its scene; a .blend keeps the modifiers live.
+def written_reader(spec: str, path: str) -> Reader:
+    """Reads versions of a file as save_version writes them to path, from files beside it that do not stay."""
+
+    def read(version: Version) -> MeshArrays:
+        with _aside(path) as folder:
+            written = folder / Path(path).name
+            _export(spec, version, path, written)
+            return load_mesh(str(written))
+
+    return read
+
+
+def save_version(spec: str, version: Version, path: str) -> tuple[str, ...]:
+    """Opens a file, reduces what is measured of it, and saves that; a .blend keeps the whole scene, the modifiers live.
+
+    Returns:
+        What should be known of the written file.
 
     Raises:
-        FileError: the file cannot be written, or its ending is not one of EXPORTERS.
+        FileError: the file cannot be written, or would replace one that the asset is read from.
     """
-    suffix = check_ending(path)
-    objects = open_asset(spec)
-    shrink_textures(objects, version.texture)
-    for object_ in objects:
-        add_modifiers(object_, version.ratio)
-    if split_spec(spec)[1]:
-        _leave_only(objects[0], live=suffix == ".blend")
     target = Path(path)
-    try:
-        # Some formats are several files: all are written aside, then moved, the one that names the others last.
-        with (
-            tempfile.TemporaryDirectory(prefix=f".{target.name}.", dir=target.parent) as folder,
-            tempfile.TemporaryDirectory() as images,
-        ):
-            if suffix in _NAMING_IMAGES:
-                _write_images(objects, Path(folder if suffix == ".obj" else images), target.stem)
-            try:
-                EXPORTERS[suffix](os.path.join(folder, target.name))
-            except RuntimeError as error:
-                raise FileError(f"{path}: Blender cannot export it ({str(error).strip().splitlines()[-1]})") from error
-            written = [file for file in Path(folder).rglob("*") if file.is_file()]
-            written.sort(key=lambda file: file.name == target.name)
-            if not written or written[-1].name != target.name:
-                raise FileError(f"{path}: Blender has exported nothing; try another ending")
-            for file in written:
-                place = target.parent / file.relative_to(folder)
-                place.parent.mkdir(exist_ok=True)
-                os.replace(file, place)
-    except OSError as error:
-        raise FileError(f"{path}: cannot be written ({error.strerror or error})") from error
+    with _aside(path) as folder:
+        warnings, inputs = _export(spec, version, path, folder / target.name)
+        written = [file for file in folder.rglob("*") if file.is_file()]
+        written.sort(key=lambda file: file.name == target.name)  # the one that names the others is moved last
+        places = [target.parent / file.relative_to(folder) for file in written]
+        for place in places:
+            _refuse_input(path, str(place), inputs, FileError)
+        for file, place in zip(written, places, strict=True):
+            place.parent.mkdir(exist_ok=True)
+            os.replace(file, place)
+    return warnings
+
+
+def check_outputs(spec: str, paths: Sequence[str]) -> None:
+    """Refuses outputs that would replace what the asset is read from; opens the file.
+
+    Raises:
+        SettingsError: one is the file, an image or a material file that it names, or another of the outputs.
+        FileError, MeshError: as open_asset.
+    """
+    open_asset(spec)
+    inputs = _inputs(spec)
+    for index, path in enumerate(paths):
+        for place in (path, str(Path(path).with_suffix(".mtl"))) if path.lower().endswith(".obj") else (path,):
+            _refuse_input(path, place, inputs, SettingsError)
+        if os.path.realpath(path) in map(os.path.realpath, paths[:index]):
+            raise SettingsError(f"{path}: it is named for two outputs; name another file")
 
 
 def check_ending(path: str) -> str:
     """The ending, in lower case.
 
     Raises:
-        FileError: Blender does not write such files.
+        SettingsError: Blender does not write such files.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in EXPORTERS:
-        raise FileError(f"{path}: unknown file ending {suffix or '(none)'}; wanted: {' '.join(EXPORTERS)}")
+        raise SettingsError(f"{path}: unknown file ending {suffix or '(none)'}; wanted: {' '.join(EXPORTERS)}")
     return suffix
 
 
-# .ply and .stl hold no image. The exporters apply the modifiers.
+# .ply and .stl hold no image.
 EXPORTERS: dict[str, Callable[[str], object]] = {
-    ".glb": lambda path: bpy.ops.export_scene.gltf(filepath=path, export_format="GLB", export_apply=True),
+    ".glb": lambda path: bpy.ops.export_scene.gltf(
+        filepath=path, export_format="GLB", use_active_scene=True, export_animations=False
+    ),
     ".obj": lambda path: bpy.ops.wm.obj_export(filepath=path, path_mode="STRIP"),
     ".ply": lambda path: bpy.ops.wm.ply_export(filepath=path),
     ".stl": lambda path: bpy.ops.wm.stl_export(filepath=path),
-    ".fbx": lambda path: bpy.ops.export_scene.fbx(filepath=path, path_mode="COPY", embed_textures=True),
+    ".fbx": lambda path: bpy.ops.export_scene.fbx(
+        filepath=path, path_mode="COPY", embed_textures=True, bake_anim=False
+    ),
     ".usd": lambda path: bpy.ops.wm.usd_export(filepath=path, relative_paths=True),
     ".blend": lambda path: _save_blend(path),
 }
 _NAMING_IMAGES = (".obj", ".fbx", ".usd")  # their exporters want files of the images; .obj goes on naming them
+
+
+def _export(spec: str, version: Version, path: str, written: Path) -> tuple[tuple[str, ...], list[str]]:
+    """Opens and reduces a file, and writes it, with the files that it names beside it.
+
+    Args:
+        path: what errors call it.
+
+    Returns:
+        What should be known of it, and the files that the asset was read from.
+    """
+    suffix = check_ending(path)
+    objects = open_asset(spec)
+    inputs, alone = _inputs(spec), bool(split_spec(spec)[1])
+    warnings: tuple[str, ...] = ()
+    shrink_textures(objects, version.texture)
+    for object_ in objects:
+        add_modifiers(object_, version.ratio)
+    if suffix != ".blend":
+        if any(map(_moves, objects)):
+            warnings = (f"{path}: it holds the pose as it stands, no skeleton, shape keys or animation; a .blend does",)
+        objects = make_plain(objects, alone)
+    elif alone:
+        _leave_only(objects[0])
+    with tempfile.TemporaryDirectory() as images:
+        if suffix in _NAMING_IMAGES:
+            _write_images(objects, written.parent if suffix == ".obj" else Path(images), written.stem)
+        try:
+            with redirect_stderr(StringIO()):  # Blender prints the tracebacks of exporters written in Python
+                EXPORTERS[suffix](str(written))
+        except RuntimeError as error:
+            raise FileError(f"{path}: Blender cannot export it ({last_line(error, 'the exporter')})") from error
+    if not written.is_file():
+        raise FileError(f"{path}: Blender has exported nothing; try another ending")
+    return warnings, inputs
+
+
+@contextmanager
+def _aside(path: str) -> Iterator[Path]:
+    """A folder beside a file, which is removed.
+
+    Raises:
+        FileError: within it something cannot be written.
+    """
+    target = Path(path)
+    try:
+        with tempfile.TemporaryDirectory(prefix=f".{target.name}.", dir=target.parent) as folder:
+            yield Path(folder)
+    except OSError as error:
+        raise FileError(f"{path}: cannot be written ({error.strerror or error})") from error
+
+
+def _inputs(spec: str) -> list[str]:
+    """The files that the session was filled from."""
+    path, _ = split_spec(spec)
+    files = [path, *bpy.utils.blend_paths(absolute=True, packed=False)]
+    if path.lower().endswith(".obj"):
+        named = re.findall(rb"^[ \t]*mtllib[ \t]+(.+?)\s*$", Path(path).read_bytes(), re.MULTILINE)
+        names = [*(os.fsdecode(name.strip(b'"')) for name in named), f"{Path(path).stem}.mtl"]  # read even if not named
+        files += [os.path.join(os.path.dirname(path), name) for name in names]
+    return [file for file in files if os.path.exists(file)]
+
+
+def _refuse_input(path: str, place: str, inputs: Sequence[str], error: type[FMQMError]) -> None:
+    """An output that goes to this place must leave the inputs alone, whatever links and letter case their paths use."""
+    same = [file for file in inputs if os.path.exists(place) and os.path.samefile(file, place)]
+    if same:
+        replaces = "" if place == path else f"with {os.path.basename(place)} "
+        raise error(f"{path}: {replaces}it would replace {same[0]}, which is an input; name another file")
+
+
+def _moves(object_: bpy.types.Object) -> bool:
+    """Whether there is more to an object than its pose."""
+    line = [object_, *ancestors(object_)]
+    return (
+        getattr(object_.data, "shape_keys", None) is not None
+        or any(modifier.type == "ARMATURE" for modifier in object_.modifiers)
+        or any(each.type == "ARMATURE" or each.animation_data is not None for each in line)
+    )
 
 
 def _save_blend(path: str) -> None:
@@ -155,25 +256,20 @@ def _save_blend(path: str) -> None:
     bpy.ops.wm.save_as_mainfile(filepath=path, copy=True, relative_remap=False)
 
 
-def _leave_only(object_: bpy.types.Object, live: bool) -> None:
-    """Only this object stays in the session's scene, where it is; what its modifiers use stays in the session.
+def _leave_only(object_: bpy.types.Object) -> None:
+    """Only this object stays in the session's scene, where it is and shown; what it uses stays in the session.
 
     Collections are taken out whole, as its modifiers may use one of them.
-
-    Args:
-        live: its parent, constraints and armature still move it; exporters need them in the scene, or not at all.
     """
     scene = bpy.context.scene
     if object_ not in scene.collection.objects[:]:
         scene.collection.objects.link(object_)
+    object_.hide_render = False
     for other_scene in list(bpy.data.scenes):
         if other_scene != scene:
-            bpy.data.scenes.remove(other_scene)  # glTF has them all
+            bpy.data.scenes.remove(other_scene)
     bpy.context.view_layer.update()
-    if live:
-        _keep_used(object_)
-    else:
-        _let_go(object_)
+    _keep_used(object_)
     for other in list(scene.collection.objects):
         if other != object_:
             scene.collection.objects.unlink(other)
@@ -194,24 +290,6 @@ def _keep_used(object_: bpy.types.Object) -> None:
     for block in reached:
         if isinstance(block, bpy.types.Object) and block.library is None:
             block.use_fake_user = True
-
-
-def _let_go(object_: bpy.types.Object) -> None:
-    """What parent, constraints and armature make of an object becomes its own."""
-    matrix = object_.matrix_world.copy()
-    posed = object_.parent_type == "ARMATURE" or any(modifier.type == "ARMATURE" for modifier in object_.modifiers)
-    if posed and object_.type == "MESH":
-        # Exporters leave the deforming to a skeleton.
-        graph = bpy.context.evaluated_depsgraph_get()
-        mesh = bpy.data.meshes.new_from_object(
-            object_.evaluated_get(graph), preserve_all_data_layers=True, depsgraph=graph
-        )
-        object_.modifiers.clear()
-        object_.data = mesh
-    for constraint in list(object_.constraints):
-        object_.constraints.remove(constraint)
-    object_.parent = None
-    object_.matrix_world = matrix
 
 
 def _write_images(objects: list[bpy.types.Object], folder: Path, stem: str) -> None:

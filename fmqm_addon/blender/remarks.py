@@ -13,6 +13,9 @@ import bpy
 _PLY_HEADER = 1 << 16  # bytes in which texture names are looked for
 _TEXTURE = re.compile(rb"^comment +TextureFile +(.+?)\s*$", re.MULTILINE | re.IGNORECASE)
 _NAMED = 2  # of many
+_LONGEST = 2**18  # bytes of a line that Blender reads before 5.2; all that follows is left out
+_LONG = re.compile(rb"\n[^\n]{%d}" % _LONGEST)
+_CONTINUED = re.compile(rb"\\[ \t\r]*\n")
 _COLORED = re.compile(rb"\nv(?:[ \t]++[^\s#]++){6}")  # a vertex with a position and a color
 
 
@@ -25,9 +28,21 @@ def left_out(path: str, colors: bool = True) -> tuple[str, ...]:
         colors: whether the file's own colors and images count.
     """
     suffix = Path(path).suffix.lower()
+    if suffix == ".blend":
+        return tuple(_of_blend())
     if suffix == ".obj":
         return tuple(_of_obj(path, colors))
     return tuple(_of_ply(path)) if suffix == ".ply" and colors else ()
+
+
+def _of_blend() -> Iterable[str]:
+    for library in bpy.data.libraries:
+        names = [block.name for block in library.users_id if block.is_missing]
+        if names:
+            more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+            why = "is missing" if library.is_missing else "does not hold them"
+            where = os.path.normpath(bpy.path.abspath(library.filepath))
+            yield f"links {', '.join(names[:_NAMED])}{more} from {where}, which {why}"
 
 
 def _of_obj(path: str, colors: bool) -> Iterable[str]:
@@ -35,7 +50,9 @@ def _of_obj(path: str, colors: bool) -> Iterable[str]:
     faces = text.count(b"\nf ") + text.count(b"\nf\t")
     imported = sum(len(mesh.polygons) for mesh in bpy.data.meshes)
     if imported < faces:
-        yield f"{faces - imported} of {faces} faces were left out by Blender's importer, as broken or repeated"
+        gave_up = bpy.app.version < (5, 2) and _LONG.search(text)
+        why = f"which reads no lines of {_LONGEST:,} bytes" if gave_up else "as broken or repeated"
+        yield f"{faces - imported} of {faces} faces were left out by Blender's importer, {why}"
     if not colors:
         return
     if not any(len(mesh.color_attributes) for mesh in bpy.data.meshes) and _COLORED.search(text):
@@ -48,7 +65,7 @@ def _of_obj(path: str, colors: bool) -> Iterable[str]:
     for name in missing[:_NAMED]:
         yield f"names the material file {name}, which is missing or cannot be read"
     known = {name for each in present.values() for name in _names(_lines(each), b"newmtl")}
-    used = () if missing else _names(text, b"usemtl")
+    used = () if missing else _used_materials(text)
     unknown = [name.decode("utf-8", "replace") for name in used if name not in known]
     if unknown:
         yield f"no material file describes {', '.join(unknown[:_NAMED])}, which it uses; Blender's default is taken"
@@ -57,6 +74,8 @@ def _of_obj(path: str, colors: bool) -> Iterable[str]:
 def _lines(path: str) -> bytes:
     """The text of a file, with a break before each line and nothing before its first word."""
     text = b"\n" + Path(path).read_bytes()
+    if b"\\" in text:
+        text = _CONTINUED.sub(b" ", text)
     return re.sub(rb"\n[ \t]+", b"\n", text) if b"\n " in text or b"\n\t" in text else text
 
 
@@ -64,6 +83,18 @@ def _names(text: bytes, keyword: bytes) -> list[bytes]:
     """What follows the keyword where a line begins with it, each once."""
     found = re.findall(rb"\n" + keyword + rb"[ \t]+([^\n]*)", text)
     return list(dict.fromkeys(name.strip() for name in found))
+
+
+def _used_materials(text: bytes) -> list[bytes]:
+    """The names of the materials that faces follow, each once."""
+    found = list(re.finditer(rb"\nusemtl[ \t]+([^\n]*)", text))
+    ends = [*(each.start() for each in found), len(text)][1:]
+    used = [
+        each[1].strip()
+        for each, end in zip(found, ends, strict=True)
+        if any(text.find(face, each.end(), end) >= 0 for face in (b"\nf ", b"\nf\t"))
+    ]
+    return list(dict.fromkeys(used))
 
 
 def _of_ply(path: str) -> Iterable[str]:

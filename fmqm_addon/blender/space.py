@@ -276,9 +276,8 @@ def _warnings(
     factor = next((factor for factor in factors if factor != 1), 1.0)
     if factor != 1:
         larger = f"{factor:.6g} times as large" if factor > 1 else f"{1 / factor:.6g} times as small"
-        return (
-            f"{name}: it is {larger} as the reference; are the units different? Match Scale (--match-scale) undoes that",
-        )
+        remedy = "are the units different? Match Scale (--match-scale) undoes that"
+        return (f"{name}: it is {larger} as the reference; {remedy}",)
     scale = np.linalg.norm(chosen.box[1] - chosen.box[0]) / np.linalg.norm(target[1] - target[0])
     return (
         f"{name}: its box and the reference's differ by {100 * chosen.misfit:.0f} % of the diagonal (size "

@@ -1,18 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Truncated and malformed files on which Blender's importers would end the whole process."""
+"""Truncated and malformed files on which Blender's importers would end the whole process, or never come back."""
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Literal
+from urllib.parse import quote
 
 import bpy
 import numpy as np
 
 from ..metric.errors import FileError
+from .headers import file_header
+from .images import CRASHES, crashes
 
 _COUNT = re.compile(rb"-?0*\d{1,9}")  # Blender would end the process at 2^31
+_JPEG_2000 = (".jp2", ".j2k", ".j2c", ".jpc")
+_ASSET = re.compile("@([^@]+)@")  # in what USD says of a missing one, its name first, then that of who asks
 _PLY_BYTES = {
     **dict.fromkeys(("char", "uchar", "int8", "uint8"), 1),
     **dict.fromkeys(("short", "ushort", "int16", "uint16"), 2),
@@ -21,7 +28,48 @@ _PLY_BYTES = {
 }
 
 
-def check_alembic(path: str) -> None:
+def check_beside(path: str) -> None:
+    """Importers load what a file names: at a pipe or a device they would wait for ever, deaf to Ctrl-C.
+
+    Looked at is what lies in its folder and in the folders there.
+
+    Raises:
+        FileError: it names a pipe, a device or an image at which Blender crashes.
+    """
+    beside = _entries(os.path.dirname(path) or ".")
+    below = [inner for each in beside if each.is_dir() for inner in _entries(each.path)]
+    bad = [(each, why) for each in (*beside, *below) if (why := _why_bad(each))]
+    if not bad:
+        return
+    own = f"{Path(path).stem}.mtl"  # which an OBJ need not name
+    text = Path(path).read_bytes()
+    libraries = [each for each in beside if each.name.lower().endswith(".mtl") and each.is_file()]
+    text += b"".join(
+        Path(each).read_bytes() for each in libraries if each.name == own or os.fsencode(each.name) in text
+    )
+    for each, why in bad:
+        names = "|".join(re.escape(name) for name in (each.name, quote(each.name)))
+        if each.name == own or re.search(rb"(?<![\w.-])(?:%b)(?![\w.-])" % os.fsencode(names), text):
+            raise FileError(f"{path}: it names {each.path}; {why}")
+
+
+def _entries(folder: str) -> list[os.DirEntry[str]]:
+    try:
+        with os.scandir(folder) as found:
+            return list(found)
+    except OSError:
+        return []
+
+
+def _why_bad(entry: os.DirEntry[str]) -> str:
+    """Why an importer must not load something; "" where it may."""
+    if entry.is_file():
+        grey = entry.name.lower().endswith(_JPEG_2000) and crashes(file_header(entry.path))
+        return CRASHES if grey else ""
+    return "" if entry.is_dir() or not os.path.exists(entry.path) else "a file is wanted, not a pipe or a device"
+
+
+def check_alembic(path: str) -> tuple[str, ...]:
     """An Ogawa archive must hold its root group, which is written last.
 
     Magic and version, 8 bytes; position of the root group; that group is the number of its children, then
@@ -35,16 +83,20 @@ def check_alembic(path: str) -> None:
         file.seek(0)
         header = file.read(16)
         if not header.startswith(b"Ogawa"):
-            return  # the importer says what it is not
+            return ()  # the importer says what it is not
         root = int.from_bytes(header[8:], "little")
         file.seek(min(root, size))
         children = int.from_bytes(file.read(8), "little")
     if len(header) < 16 or root + 8 + 8 * children > size:
         raise FileError(f"{path}: the Alembic archive is truncated")
+    return ()
 
 
-def check_usd(path: str) -> None:
+def check_usd(path: str) -> tuple[str, ...]:
     """The faces of a USD file's meshes must have no more corners than are listed: Blender 4.5 reads beyond the end.
+
+    Returns:
+        The references, payloads and layers that are missing.
 
     Raises:
         FileError: they have.
@@ -53,11 +105,11 @@ def check_usd(path: str) -> None:
         bpy.utils.expose_bundled_modules()
         from pxr import Tf, Usd, UsdGeom
     except ImportError:
-        return  # Debian's Blender 5 has no pxr, and survives such files
+        return ()  # Debian's Blender 5 has no pxr, and survives such files
     try:
         stage = Usd.Stage.Open(path, Usd.Stage.LoadAll)
     except Tf.ErrorException:
-        return  # the importer says what is wrong
+        return ()  # the importer says what is wrong
     for prim in stage.TraverseAll():
         mesh = UsdGeom.Mesh(prim)
         if not mesh:
@@ -69,9 +121,11 @@ def check_usd(path: str) -> None:
                 raise FileError(
                     f"{path}: a mesh's faces have {counts.sum()} corners, {listed} are listed; export it again"
                 )
+    asked = dict.fromkeys(name for error in stage.GetCompositionErrors() for name in _ASSET.findall(str(error))[:1])
+    return tuple(f"refers to {name}, which is missing or cannot be read" for name in asked)
 
 
-def check_ply(path: str) -> None:
+def check_ply(path: str) -> tuple[str, ...]:
     """A PLY's header must make sense to Blender, and a binary file must hold the elements that it counts.
 
     Raises:
@@ -89,7 +143,7 @@ def check_ply(path: str) -> None:
             raise FileError(f"{path}: the PLY header says {said!r}; a name and a count below a billion are wanted")
     order: Literal["little", "big"] = "big" if b"format binary_big_endian" in header else "little"
     if not data.startswith(b"ply") or b"format binary_" not in header or len(header) == len(data):
-        return  # text, whose end the importer notices, or what it refuses anyway
+        return ()  # text, whose end the importer notices, or what it refuses anyway
     position = data.find(b"\n", len(header)) + 1
     try:
         for count, properties in _ply_elements(header.decode("latin-1")):
@@ -107,9 +161,10 @@ def check_ply(path: str) -> None:
                 if position > len(data):
                     break
     except (KeyError, ValueError, IndexError):
-        return  # a header that the importer judges
+        return ()  # a header that the importer judges
     if position > len(data):
         raise FileError(f"{path}: the PLY file is truncated")
+    return ()
 
 
 def _alike(

@@ -242,7 +242,7 @@ def preparing_surface(
     corners = np.asarray(mesh.corners, np.float64)[source]
     if not np.isfinite(corners).all():
         strange = np.count_nonzero(~np.isfinite(corners).all(axis=(1, 2)))
-        warnings.append(f"{mesh.name}: {strange} triangles have UVs that are not finite; taken as 0")
+        warnings.append(f"{mesh.name}: {strange} triangles have UVs or colors that are not finite; taken as 0")
         corners = np.where(np.isfinite(corners), corners, 0.0)
     yield 0.7
     return Surface(

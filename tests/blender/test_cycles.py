@@ -107,7 +107,7 @@ def bake(
     scene: Scene, shown: bpy.types.NodeSocket, alive: bpy.types.NodeSocket | None, as_number: bool = False
 ) -> np.ndarray:
     """(SIDE, SIDE, 3) linear light that Cycles emits where a socket's color or number is emitted, row 0 at v = 0. The
-    other output, which may change what an image's color is, stays in use."""
+    other output, of a shader or not, which may change what an image's color is, stays in use."""
     tree = scene.tree
     output = tree.get_output_node("ALL")
     before = output.inputs["Surface"].links[0].from_socket
@@ -122,10 +122,13 @@ def bake(
     else:
         value = shown.default_value
         emission.inputs["Color"].default_value = (value,) * 4 if shown.type == "VALUE" else tuple(value)
-    if alive is not None and alive.is_output:
+    kept = diffuse.outputs[0]
+    if alive is not None and alive.type == "SHADER":
+        kept = alive
+    elif alive is not None and alive.is_output:
         scene.link(alive, diffuse.inputs["Color"])
     scene.link(emission.outputs[0], both.inputs[0])
-    scene.link(diffuse.outputs[0], both.inputs[1])
+    scene.link(kept, both.inputs[1])
     scene.link(both.outputs[0], output.inputs["Surface"])
     with cycles(scene.object):
         assert bpy.ops.object.bake(type="EMIT", margin=0) == {"FINISHED"}
@@ -560,6 +563,147 @@ def test_alpha_that_blenders_treat_differently_is_left_to_the_baker(
     assert isinstance(look, Unread) and "alpha" in look.why
 
 
+@pytest.mark.parametrize("alpha", [False, True])
+@pytest.mark.parametrize(
+    ("kind", "channels"),
+    [(kind, 4) for kind in ("png", "tif", "tga", "webp", "bmp", "jp2", "sgi")] + [("tif", 2), ("tga", 2), ("png", 2)],
+)
+def test_kinds_of_files_with_alpha(scene: Scene, kind: str, channels: int, alpha: bool) -> None:
+    """Read as Cycles reads them, or left to it."""
+    pillow = pytest.importorskip("PIL.Image")
+    path = scene.folder / f"image.{kind}"
+    pixels = pillow.fromarray(noise(channels), "LA" if channels == 2 else "RGBA")
+    pixels.save(path, **({"lossless": True, "exact": True} if kind == "webp" else {}))
+    node = scene.node("TexImage", image=bpy.data.images.load(str(path)))
+    scene.link(node.outputs["Color"], scene.shader().inputs["Base Color"])
+    if alpha:
+        scene.link(node.outputs["Alpha"], scene.shader().inputs["Alpha"])
+    read = isinstance(read_look(scene.material, TextureCache(), Reading()), Look)
+    if read:
+        check(scene)
+    assert read == (channels == 4 and (kind in {"png", "tif", "tga"} or bpy.app.version >= (5, 2)))
+
+
+# Whether a color is multiplied by alpha depends on whether Cycles uses the alpha for anything, and it makes one node of
+# equal ones. Each of these changes two nodes of one image, whose color and alpha are used.
+
+Two = Callable[[Scene, bpy.types.Node, bpy.types.Node], object]
+
+
+def mapped(scene: Scene, node: bpy.types.Node, scale: float, uv: str = "") -> None:
+    mapping, start = scene.node("Mapping"), scene.node("UVMap", uv_map=uv) if uv else scene.node("TexCoord")
+    mapping.inputs["Scale"].default_value = (scale,) * 3
+    scene.link(start.outputs["UV"], mapping.inputs["Vector"])
+    scene.link(mapping.outputs[0], node.inputs["Vector"])
+
+
+def on_map(scene: Scene, node: bpy.types.Node, kind: str, **settings: str) -> None:
+    scene.link(scene.node(kind, **settings).outputs["Vector" if kind == "Attribute" else "UV"], node.inputs["Vector"])
+
+
+def of_its_own(scene: Scene, node: bpy.types.Node, **settings: str) -> None:
+    """Another image of the same file."""
+    node.image = bpy.data.images.load(node.image.filepath, check_existing=False)
+    node.image.colorspace_settings.name = settings.get("space", "sRGB")
+    node.image.alpha_mode = settings.get("mode", "STRAIGHT")
+
+
+TWO: dict[str, Two] = {
+    "equal": lambda scene, one, other: None,
+    "extension": lambda scene, one, other: setattr(other, "extension", "CLIP"),
+    "interpolation": lambda scene, one, other: setattr(other, "interpolation", "Closest"),
+    "projection": lambda scene, one, other: setattr(other, "projection", "BOX"),
+    "projection blend": lambda scene, one, other: setattr(other, "projection_blend", 0.5),
+    "own mapping": lambda scene, one, other: other.texture_mapping.translation.__setitem__(0, 1.0),
+    "default UV map": lambda scene, one, other: on_map(scene, other, "TexCoord"),
+    "named UV map": lambda scene, one, other: on_map(scene, other, "UVMap", uv_map="UVMap"),
+    "one UV map by two nodes": lambda scene, *both: [on_map(scene, each, "UVMap", uv_map="UVMap") for each in both],
+    "attributes": lambda scene, *both: [on_map(scene, each, "Attribute", attribute_name="UVMap") for each in both],
+    "idle mapping": lambda scene, one, other: mapped(scene, other, 1),
+    "equal mappings": lambda scene, one, other: [mapped(scene, each, 2) for each in (one, other)],
+    "unlike mappings": lambda scene, one, other: [mapped(scene, one, 2), mapped(scene, other, 3)],
+    "mappings of unlike UV maps": lambda scene, *both: [
+        mapped(scene, each, 2, name) for each, name in zip(both, ("UVMap", "Second"), strict=True)
+    ],
+    "two images": lambda scene, one, other: of_its_own(scene, other),
+    "two spaces": lambda scene, one, other: of_its_own(scene, other, space="Linear Rec.709"),
+    "two modes": lambda scene, one, other: of_its_own(scene, other, mode="CHANNEL_PACKED"),
+    "one packed image": lambda scene, one, other: one.image.pack(),
+    "two packed images": lambda scene, one, other: [
+        of_its_own(scene, other),
+        *(each.image.pack() for each in (one, other)),
+    ],
+}
+
+
+@pytest.mark.parametrize("name", TWO)
+def test_two_nodes_of_an_image(scene: Scene, name: str) -> None:
+    one = scene.image(noise(4))
+    other = scene.node("TexImage", image=one.image)
+    TWO[name](scene, one, other)
+    scene.link(one.outputs["Color"], scene.shader().inputs["Base Color"])
+    scene.link(other.outputs["Alpha"], scene.shader().inputs["Roughness"])
+    wanted = encode_srgb(bake(scene, one.outputs["Color"], other.outputs["Alpha"]))
+    np.testing.assert_allclose(seen(scene.surface())[0], wanted, rtol=0, atol=TOLERANCE)
+
+
+def in_mix_shader(scene: Scene, alpha: bpy.types.NodeSocket, factor: float) -> None:
+    mix, other, output = scene.node("MixShader"), scene.node("BsdfGlossy"), scene.tree.get_output_node("ALL")
+    mix.inputs[0].default_value = factor
+    scene.link(alpha, other.inputs["Roughness"])
+    scene.link(scene.shader().outputs[0], mix.inputs[1 if factor == 0 else 2])
+    scene.link(other.outputs[0], mix.inputs[2 if factor == 0 else 1])
+    scene.link(mix.outputs[0], output.inputs["Surface"])
+
+
+def in_math(scene: Scene, alpha: bpy.types.NodeSocket, second: float) -> None:
+    math = scene.node("Math", operation="MULTIPLY")
+    math.inputs[1].default_value = second
+    scene.link(alpha, math.inputs[0])
+    scene.link(math.outputs[0], scene.shader().inputs["Metallic"])
+
+
+def in_emission(scene: Scene, alpha: bpy.types.NodeSocket, strength: float) -> None:
+    scene.shader().inputs["Emission Strength"].default_value = strength
+    scene.link(alpha, scene.shader().inputs["Emission Color"])
+
+
+def in_mix(scene: Scene, alpha: bpy.types.NodeSocket, factor: float, number: int, blend: str = "MIX") -> None:
+    mix = scene.node("Mix", data_type="RGBA", blend_type=blend)
+    mix.inputs["Factor"].default_value = factor
+    scene.link(alpha, mix.inputs[number])
+    scene.link(mix.outputs[2], scene.shader().inputs["Specular Tint"])
+
+
+def in_volume(scene: Scene, alpha: bpy.types.NodeSocket) -> None:
+    volume = scene.node("VolumePrincipled")
+    scene.link(alpha, volume.inputs["Density"])
+    scene.link(volume.outputs[0], scene.tree.get_output_node("ALL").inputs["Volume"])
+
+
+USES: dict[str, Callable[[Scene, bpy.types.NodeSocket], None]] = {
+    "times one": lambda scene, alpha: in_math(scene, alpha, 1),
+    "times zero": lambda scene, alpha: in_math(scene, alpha, 0),
+    "emission off": lambda scene, alpha: in_emission(scene, alpha, 0),
+    "first shader": lambda scene, alpha: in_mix_shader(scene, alpha, 0),
+    "second shader": lambda scene, alpha: in_mix_shader(scene, alpha, 1),
+    "hidden color": lambda scene, alpha: in_mix(scene, alpha, 0, 7),
+    "covered color": lambda scene, alpha: in_mix(scene, alpha, 1, 6),
+    "multiplied color": lambda scene, alpha: in_mix(scene, alpha, 1, 6, "MULTIPLY"),
+    "volume": in_volume,
+}
+
+
+@pytest.mark.parametrize("name", USES)
+def test_alpha_that_is_used_elsewhere(scene: Scene, name: str) -> None:
+    """Or that Cycles takes for unused, since nothing comes of it."""
+    node, output = scene.image(noise(4)), scene.tree.get_output_node("ALL")
+    scene.link(node.outputs["Color"], scene.shader().inputs["Base Color"])
+    USES[name](scene, node.outputs["Alpha"])
+    wanted = encode_srgb(bake(scene, node.outputs["Color"], source(output.inputs["Surface"])))
+    np.testing.assert_allclose(seen(scene.surface())[0], wanted, rtol=0, atol=TOLERANCE)
+
+
 @pytest.mark.parametrize("blend", ["MIX", "MULTIPLY"])
 @pytest.mark.parametrize("factor", [0.0, 0.37, 1.0, 1.6])
 @pytest.mark.parametrize("clamps", [(False, False), (True, True), (False, True)])
@@ -728,7 +872,6 @@ f 1/1 2/2 3/3 4/4
 MTL = """newmtl M
 Kd 0.5 0.2 0.1
 map_Kd -s 2 3 1 -o 0.1 0.2 0 image.png
-map_d -s 2 2 1 image.png
 """
 
 
@@ -756,9 +899,11 @@ def test_usd(scene: Scene, surface: str, texture: str) -> None:
     check(scene)
 
 
-def test_obj(scene: Scene) -> None:
+@pytest.mark.parametrize("opacity", ["map_d -s 2 2 1 image.png", "map_d -s 2 3 1 -o 0.1 0.2 0 image.png"])
+def test_obj(scene: Scene, opacity: str) -> None:
+    """One image of color and opacity, which only the second places alike."""
     scenes.write_png(scene.folder / "image.png", noise(4))
     (scene.folder / "square.obj").write_text(OBJ, encoding="utf-8")
-    (scene.folder / "square.mtl").write_text(MTL, encoding="utf-8")
+    (scene.folder / "square.mtl").write_text(f"{MTL}{opacity}\n", encoding="utf-8")
     imported(scene, "square.obj")
     check(scene)

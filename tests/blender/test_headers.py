@@ -73,6 +73,17 @@ def test_by_hand() -> None:
         assert read_header(io.BytesIO(data)) == Header(37, 21), data
 
 
+@pytest.mark.parametrize("kind", ["png", "tif", "tga", "jp2", "j2k"])
+def test_grey_with_alpha(tmp_path: Path, kind: str) -> None:
+    pillow = pytest.importorskip("PIL.Image")
+    path = tmp_path / f"image.{kind}"
+    for mode in ("L", "LA", "RGB", "RGBA"):
+        pillow.new(mode, (37, 21)).save(path)
+        found = file_header(str(path))
+        assert found == Header(37, 21, is_grey_with_alpha=mode == "LA")
+        assert found.kind == {"tif": "tiff", "j2k": "jp2"}.get(kind, kind)
+
+
 def test_size_of_a_jpeg_behind_a_thumbnail_of_another_size(tmp_path: Path) -> None:
     saved(tmp_path / "image", "JPEG")
     whole = (tmp_path / "image").read_bytes()

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import bpy
 import pytest
 
 from fmqm_addon.blender.files import SUFFIXES, load_placed
@@ -204,6 +205,41 @@ def test_paths_that_are_no_files(tmp_path: Path, unharmed: None) -> None:
         ("nowhere.glb", "no such file"),
     ):
         assert words in str(outcome(tmp_path / name))
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
+@pytest.mark.parametrize("pipe", ["named.mtl", "shape.mtl", "image one.png", "textures/skin.png", "shape.bin"])
+def test_pipes_and_devices_that_files_name(tmp_path: Path, unharmed: None, pipe: str) -> None:
+    """Importers would wait for ever at them. Others that lie there do not matter."""
+    (tmp_path / "textures").mkdir()
+    (tmp_path / "named.mtl").write_text("newmtl M\nmap_Kd image one.png\nmap_d textures/skin.png\n")
+    (tmp_path / "shape.obj").write_text("mtllib named.mtl\nusemtl M\n" + TETRAHEDRON)
+    gltf = {"asset": {"version": "2.0"}, "buffers": [{"uri": "shape.bin", "byteLength": 9}]}
+    gltf |= {"images": [{"uri": "image%20one.png"}, {"uri": "textures/skin.png"}]}
+    (tmp_path / "shape.gltf").write_text(json.dumps(gltf))
+    (tmp_path / "other.obj").write_text(TETRAHEDRON)
+    (tmp_path / pipe).unlink(missing_ok=True)
+    os.mkfifo(tmp_path / pipe)
+    (tmp_path / "nothing.png").symlink_to("gone.png")
+    path = tmp_path / ("shape.gltf" if pipe.endswith(".bin") else "shape.obj")
+    for asked in {path, tmp_path / "shape.gltf"} if pipe.endswith(".png") else {path}:
+        assert outcome(asked) == f"{asked}: it names {tmp_path / pipe}; a file is wanted, not a pipe or a device"
+    assert outcome(tmp_path / "other.obj") == 1.0
+
+
+@pytest.mark.skipif(os.sep == "\\", reason="on Windows these are the separators")
+def test_backslash_in_the_name_of_an_image(tmp_path: Path, unharmed: None) -> None:
+    path = write_torus(tmp_path, "ring", "a\\b.png")
+    write_png(tmp_path / "a\\b.png", noise(17))
+    assert "takes for a slash" in str(outcome(path))
+
+
+@pytest.mark.skipif(bpy.app.version >= (5, 2), reason="this Blender survives it")
+def test_image_at_which_an_importer_crashes(tmp_path: Path, unharmed: None) -> None:
+    pillow = pytest.importorskip("PIL.Image")
+    pillow.new("LA", (24, 20)).save(tmp_path / "grey.jp2")
+    path = write_torus(tmp_path, "ring", "grey.jp2")
+    assert "crashes at a JPEG 2000" in str(outcome(path))
 
 
 @pytest.mark.parametrize("name", ["two\nlines", "tab\t%s{0}", "\u202e\U0001f480", "-dash", "x" * 240, "a:b", " "])

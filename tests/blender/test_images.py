@@ -15,6 +15,7 @@ from fmqm_addon.blender.headers import Limits
 from fmqm_addon.blender.images import (
     TextureCache,
     image_digest,
+    image_facts,
     image_path,
     load_texture,
     read_pixels,
@@ -200,6 +201,69 @@ def test_a_header_that_lies_is_refused(tmp_path: Path) -> None:
     path.write_bytes(whole)
     with pytest.raises(MeshError, match="97293039 x 1048810005"):
         read_look(scenes.textured(path), TextureCache(), Reading())
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
+def test_pipe_in_place_of_an_image_is_refused(tmp_path: Path) -> None:
+    image = loaded(tmp_path, scenes.noise())
+    os.remove(tmp_path / "image.png")
+    os.mkfifo(tmp_path / "image.png")
+    assert image_facts(image, "base color", "").width == 0
+    with pytest.raises(MeshError, match=r"image\.png: the image is a pipe or a device"):
+        read_pixels(image)
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/self/mem"), reason="this system has no file that fails")
+def test_file_that_fails_while_it_is_read(tmp_path: Path) -> None:
+    (tmp_path / "image.png").symlink_to("/proc/self/mem")
+    image = bpy.data.images.load(str(tmp_path / "image.png"))
+    with pytest.raises(MeshError, match=r"image\.png: the image cannot be read \("):
+        image_digest(image)
+
+
+@pytest.mark.skipif(bpy.app.version >= (5, 2), reason="this Blender survives it")
+def test_image_at_which_blender_crashes_is_refused(tmp_path: Path) -> None:
+    pillow = pytest.importorskip("PIL.Image")
+    path = tmp_path / "image.jp2"
+    pillow.new("L", (24, 20)).save(path)
+    image = bpy.data.images.load(str(path))  # which would crash later
+    pillow.new("LA", (24, 20)).save(path)
+    with pytest.raises(MeshError, match=r"image\.jp2: Blender before 5\.2 crashes"):
+        read_pixels(image)
+    with pytest.raises(FileError, match=r"image\.jp2: Blender before 5\.2 crashes"):
+        load_texture(str(path))
+
+
+def test_image_that_was_not_decoded_is_told(tmp_path: Path) -> None:
+    """Blender shows a TIFF of a compression that it lacks as black."""
+    pillow = pytest.importorskip("PIL.Image")
+    path = tmp_path / "image.tif"
+    pillow.fromarray(scenes.noise()).save(path)
+    assert not mesh_arrays([scenes.square(materials=[scenes.textured(path)])], "asset").warnings
+    data = path.read_bytes()
+    plain, lzma = ((259).to_bytes(2, "little") + b"\3\0\1\0\0\0" + code.to_bytes(2, "little") for code in (1, 34925))
+    assert plain in data
+    path.write_bytes(data.replace(plain, lzma))
+    (warning,) = mesh_arrays([scenes.square(materials=[scenes.textured(path)])], "asset").warnings
+    assert f"{path} is black all over" in warning
+
+
+def test_sequence_is_baked_at_the_scenes_frame(tmp_path: Path) -> None:
+    for number in (1, 2):
+        scenes.write_png(tmp_path / f"s_{number}.png", np.full((4, 4, 3), 100 * number, np.uint8))
+    material = scenes.textured(tmp_path / "s_1.png")
+    node = material.node_tree.nodes["Image Texture"]
+    node.image.source = "SEQUENCE"
+    node.image_user.frame_duration, node.image_user.use_auto_refresh = 2, True
+    bpy.context.scene.frame_set(2)
+    arrays = mesh_arrays([scenes.square(materials=[material])], "asset", Reading(bake=32))
+    (warning,) = arrays.warnings
+    assert "shows a sequence; baked" in warning
+    seen = arrays.materials[0].color.lookup(arrays.corners[0].astype(float))
+    assert seen == pytest.approx(np.full_like(seen, 200 / 255), abs=1.5 / 255)
+    (tmp_path / "s_1.png").unlink()
+    with pytest.raises(MeshError, match=r"s_1\.png: the base-color image is missing"):
+        mesh_arrays([scenes.square(materials=[material])], "asset")
 
 
 @pytest.mark.parametrize(("number", "place"), [(1001, (0, 0)), (1002, (1, 0)), (1010, (9, 0)), (1011, (0, 1))])

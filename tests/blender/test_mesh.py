@@ -369,7 +369,7 @@ def test_uvs_that_are_not_finite_still_give_a_color() -> None:
     object_.data.uv_layers[0].uv[0].vector = (np.nan, np.nan)
     surface = prepare_surface(mesh_arrays([object_], "asset"), BVHQuery)
     assert np.isfinite(surface.color_at(np.arange(2), np.full((2, 3), 1 / 3))).all()
-    assert any("UVs that are not finite" in warning for warning in surface.warnings)
+    assert any("UVs or colors that are not finite" in warning for warning in surface.warnings)
 
 
 def test_scale_of_zero_reaches_the_metric_as_flat_triangles() -> None:

@@ -6,13 +6,16 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import bpy
 import numpy as np
 import pytest
 
 from fmqm_addon.blender.files import load_placed
 from fmqm_addon.blender.images import load_texture
 from fmqm_addon.blender.mesh import AS_FOUND
+from fmqm_addon.metric.errors import MeshError
 
+from . import scenes
 from .hostile_files import TETRAHEDRON
 from .script import noise, write_png, write_torus
 
@@ -44,13 +47,15 @@ def told(path: Path) -> list[str]:
             [f"names the material file {name}, which is missing or cannot be read" for name in ("x" * 300, "\\x00")],
         ),
         (
-            "mtllib sub.mtl\nusemtl blue\nusemtl red\n" + TETRAHEDRON,
+            "mtllib sub.mtl\nusemtl blue\n" + TETRAHEDRON + "usemtl red\nv 2 2 2\nf 1 2 5\n",
             ["no material file describes blue, which it uses; Blender's default is taken"],
         ),
         (
             TETRAHEDRON + "f 1 2 9\nf 3 3 1\n",
             ["2 of 6 faces were left out by Blender's importer, as broken or repeated"],
         ),
+        ("mtllib sub.mtl\nusemtl blue\nusemtl red\n" + TETRAHEDRON, []),
+        ("mtllib \\\nsub.mtl\nusemtl \\ \r\n red\n" + TETRAHEDRON, []),
         (WITH_COLORS, ["its vertex colors were left out by Blender's importer, since not all vertices have one"]),
         (WITH_COLORS.replace("v 1 0 0\nv 0 1 0\nv 0 0 1", "v 1 0 0 1 1 1\nv 0 1 0 1 1 1\nv 0 0 1 0 0 0"), []),
     ],
@@ -61,6 +66,69 @@ def test_obj(tmp_path: Path, text: str, expected: list[str]) -> None:
     path = tmp_path / "shape.obj"
     path.write_bytes(text.encode())
     assert told(path) == expected
+
+
+@pytest.mark.parametrize("before", ["", TETRAHEDRON])
+def test_line_at_which_blender_gives_up(tmp_path: Path, before: str) -> None:
+    path = tmp_path / "long.obj"
+    path.write_text(f"{before}g {'x ' * 2**18}\n{TETRAHEDRON}")
+    try:
+        said = told(path)
+    except MeshError as error:
+        said = [str(error)]
+    late = bpy.app.version >= (5, 2)
+    assert any("4 of" in each and "no lines of 262,144 bytes" in each for each in said) != late, said
+
+
+def test_missing_libraries(tmp_path: Path) -> None:
+    """All of the file, or a part of it, is left out by Blender."""
+    scenes.clear()
+    linked = scenes.square("Linked", materials=[scenes.material("Skin")])
+    bpy.data.libraries.write(str(tmp_path / "library.blend"), {linked})
+    for own in (False, True):
+        scenes.clear()
+        with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, wanted):
+            wanted.objects, wanted.materials = ["Linked"], ["Skin"]
+        bpy.context.scene.collection.objects.link(bpy.data.objects["Linked"])
+        if own:
+            scenes.square("Own", materials=[bpy.data.materials["Skin"]])
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / f"{own}.blend"))
+    assert not told(tmp_path / "True.blend")
+    (tmp_path / "library.blend").unlink()
+    where = f"from {tmp_path / 'library.blend'}, which is missing"
+    (said,) = told(tmp_path / "True.blend")
+    assert said.startswith("links ") and "Linked" in said and said.endswith(where)
+    assert any(
+        "Skin is missing from its library" in each for each in load_placed(str(tmp_path / "True.blend")).mesh.warnings
+    )
+    with pytest.raises(MeshError, match="no mesh in it") as caught:
+        load_placed(str(tmp_path / "False.blend"))
+    assert where in str(caught.value)
+
+
+USD_TRIANGLE = """def Mesh "A" {
+  int[] faceVertexCounts = [3]
+  int[] faceVertexIndices = [0, 1, 2]
+  point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]
+}
+"""
+
+
+@pytest.mark.parametrize("how", ["references", "payload", "subLayers"])
+def test_missing_parts_of_usd(tmp_path: Path, how: str) -> None:
+    bpy.utils.expose_bundled_modules()
+    pytest.importorskip("pxr")  # which Debian's Blender 5 lacks
+    names = f"({how} = {'[@part.usda@]' if how == 'subLayers' else '@part.usda@'})\n"
+    layer, prim = (names, "") if how == "subLayers" else ("", names)
+    (tmp_path / "part.usda").write_text(f'#usda 1.0\n(defaultPrim = "A")\n{USD_TRIANGLE}')
+    (tmp_path / "whole.usda").write_text(f'#usda 1.0\n{layer}def "B" {prim}{{\n}}\n{USD_TRIANGLE}')
+    (tmp_path / "empty.usda").write_text(f'#usda 1.0\n{layer}def "B" {prim}{{\n}}\n')
+    assert not told(tmp_path / "whole.usda")
+    (tmp_path / "part.usda").unlink()
+    said = "refers to part.usda, which is missing or cannot be read"
+    assert told(tmp_path / "whole.usda") == [said]
+    with pytest.raises(MeshError, match=f"no mesh in it.*{said}"):
+        load_placed(str(tmp_path / "empty.usda"))
 
 
 def test_the_namesake_counts_as_named(tmp_path: Path) -> None:

@@ -223,4 +223,4 @@ def test_uvs_that_are_not_finite_are_taken_as_0() -> None:
     mesh.corners[2, 0] = 0.25, -np.inf
     prepared = prepare_surface(mesh, NaiveQuery)
     assert prepared.corners[0, 1].tolist() == [0, 0.5] and prepared.corners[2, 0].tolist() == [0.25, 0]
-    assert any("2 triangles have UVs that are not finite" in warning for warning in prepared.warnings)
+    assert any("2 triangles have UVs or colors that are not finite" in warning for warning in prepared.warnings)

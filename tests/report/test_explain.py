@@ -36,18 +36,18 @@ CASES = [
     (record(0.9997, (1.0,) * 4), "b.glb cannot be told from a.glb (FMQM 0.9997)."),
     (
         record(0.73, TEXTURE_LOW),
-        "b.glb looks visibly different from a.glb (FMQM 0.73). The geometry is nearly as it was; edges in the texture are "
-        f"weaker or softer, or have moved. {SEED}",
+        "b.glb looks visibly different from a.glb (FMQM 0.73). The geometry is nearly as it was; edges in the texture "
+        f"are weaker or softer, or have moved. {SEED}",
     ),
     (
         record(0.73, TEXTURE_LOW, attribution=attribution("geometry")),
-        "b.glb looks visibly different from a.glb (FMQM 0.73). The surface is nearly as it was, but the texture does not "
-        f"lie on it as before: edges in the texture are weaker or softer, or have moved. {SEED}",
+        "b.glb looks visibly different from a.glb (FMQM 0.73). The surface is nearly as it was, but the texture does "
+        f"not lie on it as before: edges in the texture are weaker or softer, or have moved. {SEED}",
     ),
     (
         record(0.94, GEOMETRY_LOW),
-        "b.glb looks much like a.glb (FMQM 0.94). The color is nearly as it was; the surface has moved, shrunk or lost its "
-        f"bumps. {SEED}",
+        "b.glb looks much like a.glb (FMQM 0.94). The color is nearly as it was; the surface has moved, shrunk or lost "
+        f"its bumps. {SEED}",
     ),
     (
         record(0.6, ALL_LOW),
