@@ -54,9 +54,10 @@ def check_beside(path: str) -> None:
 
 
 def _entries(folder: str) -> list[os.DirEntry[str]]:
+    """What lies in a folder, links aside that lead nowhere or round in circles."""
     try:
         with os.scandir(folder) as found:
-            return list(found)
+            return [entry for entry in found if not entry.is_symlink() or os.path.exists(entry.path)]
     except OSError:
         return []
 
@@ -66,7 +67,7 @@ def _why_bad(entry: os.DirEntry[str]) -> str:
     if entry.is_file():
         grey = entry.name.lower().endswith(_JPEG_2000) and crashes(file_header(entry.path))
         return CRASHES if grey else ""
-    return "" if entry.is_dir() or not os.path.exists(entry.path) else "a file is wanted, not a pipe or a device"
+    return "" if entry.is_dir() else "a file is wanted, not a pipe or a device"
 
 
 def check_alembic(path: str) -> tuple[str, ...]:

@@ -207,6 +207,13 @@ def test_paths_that_are_no_files(tmp_path: Path, unharmed: None) -> None:
         assert words in str(outcome(tmp_path / name))
 
 
+def test_links_beside_a_file_may_lead_anywhere(tmp_path: Path, unharmed: None) -> None:
+    (tmp_path / "shape.obj").write_text(TETRAHEDRON, encoding="utf-8")
+    for name, target in (("circle", "circle"), ("nowhere", "gone.png"), ("here", ".")):
+        (tmp_path / name).symlink_to(target)
+    assert outcome(tmp_path / "shape.obj") == 1.0
+
+
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
 @pytest.mark.parametrize("pipe", ["named.mtl", "shape.mtl", "image one.png", "textures/skin.png", "shape.bin"])
 def test_pipes_and_devices_that_files_name(tmp_path: Path, unharmed: None, pipe: str) -> None:
