@@ -130,6 +130,7 @@ def test_the_same_bytes_whatever_the_number_of_jobs(assets: Path, tmp_path: Path
     assert told[0] == told[1]
 
 
+@pytest.mark.once
 def test_resuming_scores_what_is_missing_or_has_changed(assets: Path, tmp_path: Path) -> None:
     rows = pairs_of(*SHAKEN[:4])
     journal = tmp_path / "journal"
@@ -154,6 +155,7 @@ def test_resuming_scores_what_is_missing_or_has_changed(assets: Path, tmp_path: 
     assert len(scored(journal)) == 5, "without --resume it begins anew"
 
 
+@pytest.mark.once
 def test_resuming_tries_errors_again_whose_cause_may_be_repaired(assets: Path, tmp_path: Path) -> None:
     """An image that was missing is no file that the row names, so that nothing else tells that it has come."""
     image = noise(seed=1)
@@ -200,6 +202,7 @@ def test_what_nobody_has_foreseen_is_an_error_of_its_pair(
     ]
 
 
+@pytest.mark.once
 def test_files_are_written_though_nobody_reads_the_table(assets: Path, tmp_path: Path) -> None:
     """As with | head -1; errors of a full disk are one line, and leave the files as well."""
     manifest = write_manifest(assets, pairs_of("ref.obj", "cut.glb"))
@@ -225,6 +228,7 @@ def test_the_work_goes_on_though_nobody_reads_its_progress(assets: Path, tmp_pat
     assert done.returncode == 0 and "1.0" in (tmp_path / "c").read_text()
 
 
+@pytest.mark.once
 def test_remarks_name_their_pairs(assets: Path, tmp_path: Path) -> None:
     """Where there are several; a warning of all of them comes once. Below a threshold, each pair has a line."""
     write_torus(tmp_path, "bare")
@@ -244,6 +248,7 @@ def test_remarks_name_their_pairs(assets: Path, tmp_path: Path) -> None:
         assert any(f" {how} second" in done.stderr for how in ("scoring", "scored"))
 
 
+@pytest.mark.once
 def test_interrupted_run_says_how_to_go_on(assets: Path, tmp_path: Path) -> None:
     """SIGTERM as Ctrl-C; plain pairs too, whose journal is gone once they are all done."""
     command = [sys.executable, str(SCORE), "ref.obj", *SHAKEN, *TINY, "--csv", str(tmp_path / "c"), "--quiet"]
@@ -280,6 +285,7 @@ def test_junit(assets: Path, tmp_path: Path) -> None:
     assert "cut.glb" in suite.find("*/error").get("message")  # type: ignore[union-attr]
 
 
+@pytest.mark.once
 def test_shards_merge_into_the_whole(assets: Path, tmp_path: Path) -> None:
     manifest = write_manifest(assets, pairs_of(*SHAKEN[:5]))
     command = ["--manifest", manifest, *TINY, "--quiet", "--fail-under", "0.9"]
@@ -305,6 +311,7 @@ def test_shards_merge_into_the_whole(assets: Path, tmp_path: Path) -> None:
     assert done.returncode == 1 and "a.png: not a JSON output" in done.stderr
 
 
+@pytest.mark.once
 def test_lod_chains_of_a_file(assets: Path, tmp_path: Path) -> None:
     """Of a glb and of a blend: each level against level 0 and against the level before."""
     import bpy

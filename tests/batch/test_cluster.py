@@ -93,6 +93,7 @@ def test_a_cluster_without_the_package_says_what_to_do(
     assert "No module named 'fmqm_addon'" in done.stderr and f"PYTHONPATH={SCORE.parents[1]}" in done.stderr
 
 
+@pytest.mark.once
 def test_without_a_scheduler_or_dask_it_says_so(assets: Path, tmp_path: Path) -> None:
     done = score("ref.obj", NAMES[0], "--dask", "tcp://127.0.0.1:9", cwd=assets)
     assert done.returncode == 1 and "no scheduler answers" in done.stderr

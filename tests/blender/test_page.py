@@ -311,6 +311,7 @@ def files(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
+@pytest.mark.once
 def test_a_report_from_workers_resumed_draws_what_is_missing(run: Path) -> None:
     batch = (*FILES, "--report", "jobs", "--journal", "jobs.jsonl")
     assert score(*batch, "--jobs", "2", cwd=run).returncode == 1
@@ -323,6 +324,7 @@ def test_a_report_from_workers_resumed_draws_what_is_missing(run: Path) -> None:
     assert files(run / "jobs") == whole and kept.stat().st_mtime_ns == before
 
 
+@pytest.mark.once
 def test_a_report_is_merged_from_shards(run: Path) -> None:
     for shard in (1, 2):
         flags = ("--shard", f"{shard}/2", "--report", "parts", "--json", f"part{shard}.json")

@@ -300,6 +300,7 @@ def test_blend_objects_and_odd_names(assets: Path, tmp_path: Path) -> None:
 # Settings
 
 
+@pytest.mark.once
 def test_repeats_are_the_mean_and_its_standard_error(assets: Path, tmp_path: Path) -> None:
     single = []
     for seed in (5, 6, 7):
@@ -341,6 +342,7 @@ def test_a_perfect_score_is_not_under_1(assets: Path) -> None:
     assert score("ref.obj", "ref.obj", *SMALL, "--fail-under", "1", cwd=assets).returncode == 0
 
 
+@pytest.mark.once
 def test_preset_fast_and_flags_that_win_over_it(assets: Path, tmp_path: Path) -> None:
     common = ("ref.obj", "shaken.obj", "--samples", "3200", "--patches", "60", "--quiet", "--json", tmp_path / "j")
     for flags, scored in (((), 60), (("--preset", "fast"), 40), (("--scored-patches", 7, "--preset", "fast"), 7)):
@@ -419,6 +421,7 @@ def test_help_needs_no_blender(tmp_path: Path) -> None:
 # Textures
 
 
+@pytest.mark.once
 def test_textures_by_hand(assets: Path, tmp_path: Path) -> None:
     """Once per DISTORTED; --ref-texture makes a bare reference what ref.obj is."""
     textures = ("--ref-texture", "a.png", "--texture", "a.png", "--texture", "b.png")
@@ -431,6 +434,7 @@ def test_textures_by_hand(assets: Path, tmp_path: Path) -> None:
     assert not given[0]["warnings"]
 
 
+@pytest.mark.once
 def test_one_texture_for_all(assets: Path, tmp_path: Path) -> None:
     """Also in the place of an image that is missing."""
     names = ("repainted.obj", "bare.obj", "broken.obj")
@@ -476,6 +480,7 @@ def test_bake_sets_the_size_or_forbids_it(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("limit", [("--max-image-side", 15), ("--max-image-bytes", 1023)])
+@pytest.mark.once
 def test_images_beyond_the_limits_are_refused(assets: Path, limit: tuple[str, int]) -> None:
     done = score("ref.obj", "ref.obj", *SMALL, *limit, "--quiet", cwd=assets)
     assert done.returncode == 1 and "a.png" in said(done.stderr)[0]
@@ -538,6 +543,7 @@ def test_without_a_reference_no_pair_is_scored(assets: Path, tmp_path: Path, ref
     ],
     ids=["lines only", "collinear", "one place", "empty"],
 )
+@pytest.mark.once
 def test_surface_without_area(assets: Path, tmp_path: Path, text: str, words: str) -> None:
     (tmp_path / "flat.obj").write_text(text)
     for reference, other in ((assets / "ref.obj", "flat.obj"), ("flat.obj", assets / "ref.obj")):
@@ -547,6 +553,7 @@ def test_surface_without_area(assets: Path, tmp_path: Path, text: str, words: st
         assert words in pair["error"] and "flat.obj" in one_line(done.stderr)
 
 
+@pytest.mark.once
 def test_degenerate_surfaces_give_numbers(assets: Path, tmp_path: Path) -> None:
     """One triangle; a sliver; one far away; NaN nowhere, and nothing outside [0, 1]."""
     for name, corners in (
@@ -644,6 +651,7 @@ def test_outputs_do_not_replace_inputs(tmp_path: Path, flag: str, name: str) -> 
     assert {name: after[name] for name in before} == before
 
 
+@pytest.mark.once
 def test_one_kind_of_text_goes_to_stdout(assets: Path, whole: Path, tmp_path: Path) -> None:
     for flag in ("--csv", "--junit"):
         done = score(assets / "ref.obj", assets / "shaken.obj", *SMALL, flag, "-", "--quiet", cwd=tmp_path)
@@ -663,6 +671,7 @@ def without(module: str, folder: Path) -> dict[str, str]:
     return {"PYTHONPATH": str(folder)}
 
 
+@pytest.mark.once
 def test_without_pillow_only_the_picture_is_missing(assets: Path, whole: Path, tmp_path: Path) -> None:
     env = without("PIL", tmp_path)
     out = tmp_path / "out"
