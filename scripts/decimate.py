@@ -36,9 +36,8 @@ def build_parser() -> OneLineParser:
         description="The fewest triangles (Decimate, collapse) or the smallest textures whose FMQM is at or above a "
         "target, found by bisection.",
         epilog="With -o the versions that decide are scored as they are read back from such a file. Exit codes: 0 "
-        "found, written; 1 the target is missed even by the dearest version allowed, or a file cannot be read "
-        "or written; "
-        "2 wrong arguments.",
+        "found and written; 1 the target is missed even by the dearest version allowed, or a file cannot be read or "
+        "written; 2 wrong arguments.",
         allow_abbrev=False,
     )
     parser.add_argument("reference", metavar="REFERENCE", help="the original, as for score.py")
@@ -120,7 +119,7 @@ def _search(args: argparse.Namespace, targets: list[float], settings: Settings, 
         texture_sizes,
         written_reader,
     )
-    from fmqm_addon.report.files import check_writable, write_text
+    from fmqm_addon.report.files import check_writable, print_parts, write_text
 
     outputs = _output_names(args.output, targets if args.chain else [])
     for path in outputs:
@@ -151,13 +150,9 @@ def _search(args: argparse.Namespace, targets: list[float], settings: Settings, 
             except FMQMError as error:
                 errors.append(str(error))
     document = _json_text(args.reference, settings, reduced, saved)
-    if args.json == "-":
-        out.write(document)
-    else:
-        out.write(_table(reduced, saved))
-        if args.json:
-            write_text(args.json, document)
-    out.flush()
+    if args.json and args.json != "-":
+        write_text(args.json, document)
+    print_parts(out, [document if args.json == "-" else _table(reduced, saved)])
     for line in (*(f"warning: {warning}" for warning in warnings), *errors):
         log.say(line)
     return FAILED if errors else OK

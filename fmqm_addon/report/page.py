@@ -307,7 +307,7 @@ def _close_ups(worst: Sequence[Record]) -> str:
 
 def _image(path: str, alt: str, size: tuple[int, int] | None = None) -> str:
     sized = "" if size is None else f' width="{size[0]}" height="{size[1]}"'
-    return f'<img src="{escape(quote(path))}" alt="{escape(alt)}"{sized} loading="lazy" decoding="async">'
+    return f'<img src="{escape(quote(path))}" alt="{escape(alt)}"{sized} loading="lazy">'
 
 
 def _trust(trust: Report) -> str:

@@ -186,16 +186,22 @@ def test_a_saved_version_is_what_was_measured(torus: Path, tmp_path: Path, kind:
         assert [modifier.name for modifier in bpy.data.objects["torus"].modifiers][-1] == DECIMATE, "live"
 
 
-def save_posed(file: Path) -> None:
-    """A .blend of all that exporters treat each in their own way."""
+def posed_skeleton() -> bpy.types.Object:
+    """Of one bone, which has moved."""
     skeleton = bpy.data.objects.new("Skeleton", bpy.data.armatures.new("Skeleton"))
-    skeleton.scale = (1, 1, 2)
     bpy.context.scene.collection.objects.link(skeleton)
     bpy.context.view_layer.objects.active = skeleton
     bpy.ops.object.mode_set(mode="EDIT")
     skeleton.data.edit_bones.new("Bone").tail = (0, 0, 1)
     bpy.ops.object.mode_set(mode="OBJECT")
     skeleton.pose.bones["Bone"].location = (0, 0.7, 0)
+    return skeleton
+
+
+def save_posed(file: Path) -> None:
+    """A .blend of all that exporters treat each in their own way."""
+    skeleton = posed_skeleton()
+    skeleton.scale = (1, 1, 2)
     posed = scenes.cube("Posed")
     posed.parent, posed.rotation_euler = skeleton, (0.5, 0, 0)  # sheared
     posed.vertex_groups.new(name="Bone").add(range(8), 1.0, "REPLACE")
@@ -275,13 +281,7 @@ def test_a_saved_object_keeps_what_its_modifiers_use(tmp_path: Path, kind: str) 
     monkey.parent = parent
     monkey.constraints.new("COPY_ROTATION").target = mirror
     monkey.modifiers.new("Mirror", "MIRROR").mirror_object = mirror
-    skeleton = bpy.data.objects.new("Skeleton", bpy.data.armatures.new("Skeleton"))
-    bpy.context.scene.collection.objects.link(skeleton)
-    bpy.context.view_layer.objects.active = skeleton
-    bpy.ops.object.mode_set(mode="EDIT")
-    skeleton.data.edit_bones.new("Bone").tail = (0, 0, 1)
-    bpy.ops.object.mode_set(mode="OBJECT")
-    skeleton.pose.bones["Bone"].location = (0, 0.7, 0)
+    skeleton = posed_skeleton()
     monkey.vertex_groups.new(name="Bone").add(range(100), 1.0, "REPLACE")
     monkey.modifiers.new("Armature", "ARMATURE").object = skeleton
     scenes.square("Other")
