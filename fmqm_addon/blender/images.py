@@ -180,9 +180,11 @@ def _row_blocks(values: NDArray[Any]) -> list[slice]:
     return [slice(first, first + step) for first in range(0, height, step)]
 
 
-def is_black(pixels: Pixels) -> bool:
-    """Whether an image shows nothing but black, as those do that Blender cannot decode and calls loaded."""
-    return not any(pixels.values[rows, :, :3].any() for rows in _row_blocks(pixels.values))
+def black_warnings(name: str, values: NDArray[Any]) -> tuple[str, ...]:
+    """One, where an image shows nothing but black, as those do that Blender cannot decode and calls loaded."""
+    if any(values[rows, :, :3].any() for rows in _row_blocks(values)):
+        return ()
+    return (f"{name} is black all over; unless it is meant to be, Blender could not decode it: save it as a PNG",)
 
 
 def is_linear(image: bpy.types.Image) -> bool:

@@ -10,7 +10,7 @@ import bpy
 
 from ..metric.color import ImageFacts, Material
 from ..metric.errors import MeshError
-from .images import TextureCache
+from .images import TextureCache, black_warnings
 from .looks import Layer, Look, Reading, Unread
 from .nodes import NotReadError, node_count, only_shines, outputs, surface_of, upstream, uses_nodes
 from .reader import FIRST_ROLES, Reader, plain_color
@@ -36,7 +36,8 @@ def read_look(material: bpy.types.Material | None, cache: TextureCache, reading:
 def _read_look(material: bpy.types.Material | None, cache: TextureCache, reading: Reading) -> Look | Unread:
     if reading.texture is not None:
         name = "" if material is None else material.name
-        return Look(Material(name, reading.texture, how="given", uv=0), (Layer("uv", ""),))
+        given = Material(name, reading.texture, how="given", uv=0)
+        return Look(given, (Layer("uv", ""),), black_warnings("the image that is given", reading.texture.pixels))
     if material is None:
         grey = plain_color((DEFAULT_GREY,) * 3)
         return Look(Material("", grey, how="none"), (), ("there is no material; Blender's default grey is taken",))

@@ -48,9 +48,9 @@ from .images import (
     LINEAR_SPACES,
     Pixels,
     TextureCache,
+    black_warnings,
     check_limits,
     image_path,
-    is_black,
     same_content,
     tile_path,
     tile_place,
@@ -342,11 +342,9 @@ class Reader:
         if pixels is None:
             return None
         texture = self._sampler(place, pixels, placement)
-        if node.image.source == "FILE" and not self._in_alpha and is_black(pixels):
-            self.warnings.append(
-                f"material {self._name}: {image_path(node.image) or node.image.name} is black all over; unless it is "
-                "meant to be, Blender could not decode it: save it as a PNG"
-            )
+        if node.image.source == "FILE" and not self._in_alpha:
+            told = black_warnings(image_path(node.image) or node.image.name, pixels.values)
+            self.warnings += [f"material {self._name}: {warning}" for warning in told]
         return texture
 
     def _sampler(self, place: Place, pixels: Pixels, placement: Placement) -> Texture:

@@ -246,6 +246,8 @@ def test_image_that_was_not_decoded_is_told(tmp_path: Path) -> None:
     path.write_bytes(data.replace(plain, lzma))
     (warning,) = mesh_arrays([scenes.square(materials=[scenes.textured(path)])], "asset").warnings
     assert f"{path} is black all over" in warning
+    (warning,) = mesh_arrays([scenes.square()], "asset", Reading(texture=load_texture(str(path)))).warnings
+    assert "the image that is given is black all over" in warning
 
 
 def test_sequence_is_baked_at_the_scenes_frame(tmp_path: Path) -> None:
