@@ -9,7 +9,7 @@ for outcome in api.measure(bpy.data.objects["Rock_LOD0"], [bpy.data.objects["Roc
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import TypeAlias
 
 import bpy
@@ -24,11 +24,12 @@ from .metric.settings import PRESETS, Settings
 __all__ = ["COLUMNS", "PRESETS", "Outcome", "Result", "Settings", "measure"]
 
 Asset: TypeAlias = bpy.types.Object | bpy.types.Collection
+_ASSETS = (bpy.types.Object, bpy.types.Collection)
 
 
 def measure(
     reference: Asset,
-    distorted: Asset | Sequence[Asset],
+    distorted: Asset | Iterable[Asset],
     settings: Settings | None = None,
     space: str = "auto",
     match_scale: bool = False,
@@ -56,8 +57,15 @@ def measure(
         One outcome per distorted asset, in their order; `outcome.scores` is (5,) float64 in the order of
         COLUMNS, or None with the reason in `outcome.error`. `outcome.comparison.result` is a metric.score.Result
         with patches, samples and fields, `outcome.trust` a metric.trust.Trust: how far to believe the scores.
+
+    Raises:
+        TypeError: an asset is no object and no collection.
+        SettingsError: a setting has a value that it cannot have.
     """
-    assets = [distorted] if isinstance(distorted, (bpy.types.Object, bpy.types.Collection)) else list(distorted)
+    assets = list(distorted) if isinstance(distorted, Iterable) else [distorted]
+    for asset in (reference, *assets):
+        if not isinstance(asset, _ASSETS) or asset.is_embedded_data:
+            raise TypeError(f"{asset!r} is given; an object or a collection, not the scene's own, is wanted")
     asked = Question(settings or Settings(), repeats, space, match_scale, both, attribution, Reading(bake=bake))
     reference_target = target_of(reference, bare=reference_without_modifiers)
     return measuring(reference_target, [target_of(asset) for asset in assets], asked).run()

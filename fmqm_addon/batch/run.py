@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..blender.process import stops_wait
-from ..metric.errors import FMQMError, OutputError, one_line
+from ..metric.errors import FMQMError, ImageMissingError, ImageSizeError, OutputError, one_line
 from ..report.explain import explain, where
 from ..report.pair import PairScore, pair_record
 from ..report.pair_pictures import picture_stem, write_pair_pictures
@@ -28,6 +28,11 @@ if TYPE_CHECKING:
     from ..metric.score import Stepper
 
 T = TypeVar("T")
+# What the scripts can do about an error; the sidebar cannot.
+_REMEDIES: dict[type[Exception], str] = {
+    ImageMissingError: ", give another (--texture, --ref-texture) or let it be magenta (--bake)",
+    ImageSizeError: "; see --max-image-side, --max-image-bytes",
+}
 
 
 def score_tasks(
@@ -194,7 +199,7 @@ class _Scorer:
 def _told(error: Exception, name: str) -> str:
     """Why there are no scores; what nobody has foreseen is no reason to leave the other pairs alone."""
     if isinstance(error, FMQMError):
-        return str(error)
+        return str(error) + _REMEDIES.get(type(error), "")
     kind = MemoryError if isinstance(error, MemoryError) else type(error)  # numpy has one of its own
     return one_line(f"{name}: {kind.__name__}: {error}")
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..metric.color import ImageFacts, Texture, encode_srgb
-from ..metric.errors import FileError, MeshError
+from ..metric.errors import FileError, ImageSizeError, MeshError
 from .headers import DEFAULT_LIMITS, Header, Limits, file_header, read_header
 
 LINEAR_SPACES = frozenset({"Non-Color", "Linear Rec.709", "scene_linear"})
@@ -105,7 +105,8 @@ def read_pixels(image: bpy.types.Image, limits: Limits = DEFAULT_LIMITS) -> Pixe
     is given back to Blender: freeing other buffers would erase unsaved painting.
 
     Raises:
-        MeshError: the image promises more than the limits; nothing was decoded.
+        ImageSizeError: the image promises more than the limits; nothing was decoded.
+        MeshError: it cannot be touched; see check_limits.
     """
     check_limits(image, limits)
     was_there = image.has_data
@@ -291,7 +292,8 @@ def check_limits(image: bpy.types.Image, limits: Limits) -> None:
     """Refuses an image before anything decodes it.
 
     Raises:
-        MeshError: its header promises more than the limits, or Blender would crash, or wait for ever, at its file.
+        ImageSizeError: its header promises more than the limits.
+        MeshError: Blender would crash, or wait for ever, at its file.
     """
     if not image.packed_files:
         for path in image_paths(image):
@@ -312,11 +314,11 @@ def _check(header: Header, name: str, limits: Limits) -> None:
         raise MeshError(f"{name}: {CRASHES}")
     size = f"{header.width} x {header.height} pixels"
     if max(header.width, header.height) > limits.side:
-        raise MeshError(f"{name}: the image promises {size}, more than {limits.side} a side; see --max-image-side")
+        raise ImageSizeError(f"{name}: the image promises {size}, more than the {limits.side} a side that are allowed")
     if header.decoded > limits.decoded:
-        raise MeshError(
-            f"{name}: the image promises {size}, {header.decoded} bytes once decoded, more than {limits.decoded}; "
-            "see --max-image-bytes"
+        raise ImageSizeError(
+            f"{name}: the image promises {size}, {header.decoded} bytes once decoded, more than the {limits.decoded} "
+            "that are allowed"
         )
 
 

@@ -9,6 +9,8 @@ from typing import Literal
 from ..metric.color import ImageFacts, Material, Texture
 from .headers import DEFAULT_LIMITS, Limits
 
+MAX_BAKE = 16384  # pixels a side
+
 
 @dataclass(frozen=True)
 class Reading:

@@ -6,14 +6,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..metric.errors import SettingsError
 from ..metric.score import Stepper, Work, as_part
 from ..metric.settings import Settings
 from ..metric.spatial import Floats
 from ..metric.surface import Surface
 from .attribution import Attribution, attribute
-from .looks import Reading
+from .looks import MAX_BAKE, Reading
 from .measure import Comparison, Measurement
-from .space import Placed, Placement, place
+from .space import SPACES, Placed, Placement, place
 from .trust import known_facts
 
 
@@ -26,6 +27,9 @@ class Question:
         space, match_scale: as in blender.space.place.
         both: score the other direction too. attribution: score geometry and texture apart too.
         reading: how the materials are read.
+
+    Raises:
+        SettingsError: one of these is none that can be asked.
     """
 
     settings: Settings = Settings()
@@ -35,6 +39,16 @@ class Question:
     both: bool = False
     attribution: bool = False
     reading: Reading = Reading()
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.settings, Settings):
+            raise SettingsError(f"settings are {self.settings!r}; they must be Settings(...)")
+        if self.repeats < 1:
+            raise SettingsError(f"repeats is {self.repeats}; it must be at least 1")
+        if self.space not in SPACES:
+            raise SettingsError(f"space is {self.space!r}; it must be one of {', '.join(SPACES)}")
+        if not 0 <= self.reading.bake <= MAX_BAKE:
+            raise SettingsError(f"bake is {self.reading.bake}; it must be between 0 and {MAX_BAKE}")
 
 
 @dataclass(frozen=True)

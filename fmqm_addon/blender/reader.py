@@ -42,7 +42,7 @@ from ..metric.color import (
     Weighted,
     encode_srgb,
 )
-from ..metric.errors import MeshError
+from ..metric.errors import ImageMissingError
 from .images import (
     BRIGHTEST,
     LINEAR_SPACES,
@@ -274,12 +274,10 @@ class Reader:
         """What stands in for an image that is missing or broken."""
         if self._in_alpha:
             return PlainLight((1.0, 1.0, 1.0))
-        if node.image is None:
-            what = f"material {self._name}: {node.name}, which feeds Base Color, holds no image"
-        else:
-            what = why_unread(node.image)
+        what = f"{node.name}, which feeds Base Color, holds no image" if node.image is None else why_unread(node.image)
+        what = f"material {self._name}: {what}"
         if not self._reading.stand_in:
-            raise MeshError(f"{what}; repair it, give another (--texture, --ref-texture) or let it be magenta (--bake)")
+            raise ImageMissingError(f"{what}; repair it")
         self.warnings.append(f"{what}; magenta stands in for it")
         return PlainLight(MISSING)
 

@@ -110,15 +110,13 @@ def place(reference: Placed, compared: Placed, space: str = "auto", match_scale:
     """Brings the compared mesh to the reference.
 
     Args:
-        space: "world" or "local", or "auto": the world, unless the boxes differ there by more than APART and
+        space: of SPACES: "world" or "local", or "auto": the world, unless the boxes differ there by more than APART and
             another place fits TIMES_BETTER; a turn is tried where none does.
         match_scale: undo a difference in size by one of UNIT_FACTORS.
 
     Raises:
         MeshError: a transform that has to be undone has a scale of zero.
     """
-    if space not in SPACES:
-        raise ValueError(f"space is {space!r}; it must be one of {', '.join(SPACES)}")
     target = _box(reference.mesh, reference.origin)
     places = {"auto": ("world", "location", "local"), "world": ("world",), "local": ("local",)}[space]
     candidates = [_candidate(name, 0, reference, compared, target, match_scale) for name in places]

@@ -25,6 +25,14 @@ class MeshError(FMQMError):
     """A mesh, material or image cannot be measured."""
 
 
+class ImageMissingError(MeshError):
+    """A base-color image is missing or broken."""
+
+
+class ImageSizeError(MeshError):
+    """An image promises more than may be decoded."""
+
+
 class FileError(FMQMError):
     """A file cannot be read or written."""
 

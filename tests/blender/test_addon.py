@@ -5,8 +5,10 @@ from __future__ import annotations
 
 import inspect
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
@@ -14,6 +16,7 @@ import pytest
 
 import fmqm_addon
 from fmqm_addon import api, ui
+from fmqm_addon.metric.errors import SettingsError
 from fmqm_addon.metric.score import COLUMNS
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.ui import inputs, measuring, panels, results, session, watch
@@ -145,6 +148,28 @@ def test_the_same_doubles_as_the_script(fmqm: ui.scene.FMQMScene, lods: list[bpy
         name = pair["distorted"].rpartition(":")[2]
         assert [pair[column] for column in COLUMNS] == rows[name]
         assert pair["space"] == spaces[name]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"settings": {"samples": 8_000}}, "settings are {'samples': 8000}"),
+        ({"repeats": 0}, "repeats is 0"),
+        ({"space": "moon"}, "space is 'moon'"),
+        ({"bake": -1}, "bake is -1"),
+    ],
+)
+def test_python_is_told_what_cannot_be_asked(lods: list[bpy.types.Object], wrong: dict[str, Any], said: str) -> None:
+    with pytest.raises(SettingsError, match=re.escape(said)):
+        api.measure(lods[0], lods[1], **wrong)
+
+
+def test_python_is_told_what_is_no_asset(lods: list[bpy.types.Object]) -> None:
+    for reference, distorted in (("Rock_LOD0", lods[1]), (lods[0], None), (lods[0], [lods[1].data])):
+        with pytest.raises(TypeError, match="is given; an object or a collection"):
+            api.measure(reference, distorted)
+    with pytest.raises(TypeError, match="not the scene's own"):
+        api.measure(lods[0], bpy.context.scene.collection)
 
 
 def test_space_and_match_scale_of_the_script(lods: list[bpy.types.Object], tmp_path: Path) -> None:

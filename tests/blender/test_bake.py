@@ -659,5 +659,5 @@ def test_missing_images_are_no_secret_of_the_baker(tmp_path: Path) -> None:
 
 def test_huge_images_are_not_decoded_for_the_baker(tmp_path: Path) -> None:
     object_ = scenes.square(materials=[inverted(scenes.write_png(tmp_path / "image.png", scenes.noise(40)))])
-    with pytest.raises(MeshError, match=r"image\.png: the image promises 40 x 40 pixels, more than 32 a side"):
+    with pytest.raises(MeshError, match=r"image\.png: the image promises 40 x 40 pixels, more than the 32 a side"):
         mesh_arrays([object_], "asset", Reading(limits=Limits(side=32)))

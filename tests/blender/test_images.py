@@ -25,7 +25,7 @@ from fmqm_addon.blender.images import (
 from fmqm_addon.blender.looks import Reading
 from fmqm_addon.blender.material import read_look
 from fmqm_addon.blender.mesh import mesh_arrays
-from fmqm_addon.metric.errors import FileError, MeshError
+from fmqm_addon.metric.errors import FileError, ImageSizeError, MeshError
 from fmqm_addon.metric.surface import prepare_surface
 
 from . import scenes
@@ -176,8 +176,8 @@ def test_huge_images_are_refused_before_they_are_decoded(tmp_path: Path) -> None
     path = scenes.write_png(tmp_path / "wide.png", np.zeros((2, 40, 3), np.uint8))
     material = scenes.textured(path)
     image = material.node_tree.nodes["Image Texture"].image
-    for limits, word in ((Limits(side=39), "--max-image-side"), (Limits(decoded=319), "--max-image-bytes")):
-        with pytest.raises(MeshError) as caught:
+    for limits, word in ((Limits(side=39), "the 39 a side"), (Limits(decoded=319), "the 319 that are allowed")):
+        with pytest.raises(ImageSizeError) as caught:
             read_look(material, TextureCache(), Reading(limits=limits))
         text = str(caught.value)
         assert str(path) in text and "40 x 2" in text and word in text and not image.has_data

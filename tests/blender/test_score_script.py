@@ -483,7 +483,7 @@ def test_bake_sets_the_size_or_forbids_it(tmp_path: Path) -> None:
 @pytest.mark.once
 def test_images_beyond_the_limits_are_refused(assets: Path, limit: tuple[str, int]) -> None:
     done = score("ref.obj", "ref.obj", *SMALL, *limit, "--quiet", cwd=assets)
-    assert done.returncode == 1 and "a.png" in said(done.stderr)[0]
+    assert done.returncode == 1 and "a.png" in said(done.stderr)[0] and limit[0] in said(done.stderr)[0]
     assert score("ref.obj", "ref.obj", *SMALL, limit[0], limit[1] + 1, "--quiet", cwd=assets).returncode == 0
 
 
