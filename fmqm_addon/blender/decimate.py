@@ -177,7 +177,7 @@ class Search:
         if known is not None:
             return known
         done = 1 - (1 - _PER_STEP) ** number
-        what = f"{100 * version.ratio:.3g} % of the triangles"
+        what = f"Trying {100 * version.ratio:.3g} % of the triangles"
         if version.texture is not None:
             what += f", textures of {version.texture}"
         yield Progress(what, done)

@@ -31,7 +31,7 @@ class Outcome:
         answer: None where there is an error.
         triangles, reference_triangles: counts after triangulation, before anything is left out.
         seconds: by report.pair.STAGES; reading and preparing the reference count in the first outcome.
-        fingerprint: of reference and compared, as they were when they were read; see pair_fingerprint.
+        fingerprint: of reference and compared, as they were when they were read.
         error: why there is no score.
     """
 
@@ -73,12 +73,6 @@ class Outcome:
     def warnings(self) -> tuple[str, ...]:
         """What should be known before the scores are believed."""
         return () if self.answer is None else self.answer.warnings
-
-
-def pair_fingerprint(reference: Target, target: Target, label: str) -> tuple[str, str]:
-    """Tells which of the two has changed since the measurement whose Placement.label is given."""
-    counts = place_counts(label)
-    return fingerprint(reference, counts), fingerprint(target, counts)
 
 
 def measuring(

@@ -27,9 +27,14 @@ _CORNERS = np.array([(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)], np.float
 _FACES = np.array([(0, 1, 2), (0, 3, 1), (0, 2, 3), (1, 3, 2)], np.int32)
 
 
-def find_object(kind: str) -> bpy.types.Object | None:
-    """Our object of a kind, in any scene of this file; asked at each drawing, so it looks at few objects."""
-    return next((o for c in _ours(bpy.data.collections) for o in c.objects if o.get(TAG) == kind), None)
+def objects(scene: bpy.types.Scene) -> Iterator[bpy.types.Object]:
+    """Our objects in a scene; asked at each drawing, so it looks at few objects."""
+    return (object_ for collection in _collections(scene) for object_ in collection.objects)
+
+
+def find_object(scene: bpy.types.Scene, kind: str) -> bpy.types.Object | None:
+    """Our object of a kind in a scene."""
+    return next((object_ for object_ in objects(scene) if object_.get(TAG) == kind), None)
 
 
 def build_cloud(
@@ -95,7 +100,7 @@ def build_slice(scene: bpy.types.Scene, name: str, matrix: Floats, resolution: i
 
     Blender draws image empties in every shading, unlit.
     """
-    object_ = find_object(SLICE)
+    object_ = find_object(scene, SLICE)
     if object_ is None:
         object_ = bpy.data.objects.new(name, None)
         object_[TAG] = SLICE
@@ -119,6 +124,19 @@ def draw_slice(object_: bpy.types.Object, colors: Floats) -> None:
     pixels[:, :3] = colors
     object_.data.pixels.foreach_set(pixels.ravel())
     object_.data.update()
+    object_.data.pack()  # else it is black when the file is opened again
+
+
+def reveal(object_: bpy.types.Object, layer: bpy.types.ViewLayer) -> None:
+    """Shows an object of ours in a view layer, where it, or our collection, was hidden or left out."""
+    for found in _layer_collections(layer.layer_collection):
+        if found.collection in object_.users_collection and TAG in found.collection:
+            if found.exclude:
+                found.exclude = False
+            found.hide_viewport = found.collection.hide_viewport = False
+    object_.hide_viewport = False
+    if object_.name in layer.objects:
+        object_.hide_set(False, view_layer=layer)
 
 
 def clear() -> int:
@@ -136,6 +154,11 @@ def anything() -> bool:
     return any(True for blocks in _all_blocks() for _ in _ours(blocks))
 
 
+def anything_colored() -> bool:
+    """Whether it has one whose colors Solid shading has to be told to show."""
+    return any(True for _ in _ours(bpy.data.meshes))
+
+
 def _all_blocks() -> tuple[bpy.types.bpy_prop_collection, ...]:
     data = bpy.data  # owners before what they own
     return (data.objects, data.meshes, data.materials, data.images, data.node_groups, data.collections)
@@ -149,7 +172,7 @@ def _place(scene: bpy.types.Scene, kind: str, name: str, mesh: bpy.types.Mesh, m
     """The object of a kind, with this mesh; the mesh it had is removed."""
     mesh[TAG] = kind
     mesh.materials.append(_material())
-    object_ = find_object(kind)
+    object_ = find_object(scene, kind)
     if object_ is None:
         object_ = bpy.data.objects.new(name, mesh)
         object_[TAG] = kind
@@ -165,14 +188,24 @@ def _place(scene: bpy.types.Scene, kind: str, name: str, mesh: bpy.types.Mesh, m
 
 
 def _link(scene: bpy.types.Scene, object_: bpy.types.Object) -> None:
-    collection = next((c for c in _ours(bpy.data.collections)), None)
+    collection = next(_collections(scene), None)
     if collection is None:
         collection = bpy.data.collections.new(COLLECTION)
         collection[TAG] = "collection"
-    if collection.name not in scene.collection.children:
         scene.collection.children.link(collection)
     if object_.name not in collection.objects:
         collection.objects.link(object_)
+
+
+def _collections(scene: bpy.types.Scene) -> Iterator[bpy.types.Collection]:
+    """Ours in a scene; each scene has its own, because each has results of its own."""
+    return (found for found in _ours(bpy.data.collections) if found in scene.collection.children_recursive)
+
+
+def _layer_collections(layer: bpy.types.LayerCollection) -> Iterator[bpy.types.LayerCollection]:
+    yield layer
+    for child in layer.children:
+        yield from _layer_collections(child)
 
 
 def _cloud_mesh(name: str, positions: Floats, normals: Floats, size: float) -> bpy.types.Mesh:

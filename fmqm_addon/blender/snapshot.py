@@ -4,9 +4,12 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
+from zlib import crc32
 
 import bpy
 import numpy as np
@@ -16,7 +19,7 @@ from ..metric.errors import MeshError
 from ..metric.spatial import Floats
 from .assets import SURFACE_TYPES, check_object, collection_members, family_members, instanced, is_measured
 from .evaluate import evaluated
-from .images import TextureCache
+from .images import TextureCache, image_paths
 from .looks import Reading
 from .mesh import AS_FOUND, mesh_arrays, to_bake
 from .space import Placed
@@ -44,6 +47,10 @@ class Target:
     def find(self) -> bpy.types.Object | bpy.types.Collection | None:
         blocks = bpy.data.objects if self.kind == OBJECT else bpy.data.collections
         return next((block for block in blocks if block.name_full == self.name), None)
+
+    def is_gone(self) -> bool:
+        block = self.find()
+        return block is None or (isinstance(block, bpy.types.Object) and not block.users_scene)
 
 
 def target_of(block: bpy.types.Object | bpy.types.Collection, bare: bool = False) -> Target:
@@ -145,10 +152,9 @@ def _matrix_of(object_: bpy.types.Object) -> Floats:
 def fingerprint(target: Target, place_counts: bool) -> str:
     """A short text that differs when mesh, modifiers, materials, size or, where it counts, the place have changed.
 
-    Original data, not evaluated: cheap, and the same whether the object is hidden. "" if it is gone.
+    Original data, not evaluated: cheap, and the same whether the object is hidden or in edit mode. "" if it is gone.
     """
-    block = target.find()
-    if block is None or (isinstance(block, bpy.types.Object) and not block.users_scene):
+    if target.is_gone():
         return ""
     objects = _members(target)
     digest = hashlib.blake2b(digest_size=12)
@@ -157,6 +163,12 @@ def fingerprint(target: Target, place_counts: bool) -> str:
     for object_ in _instances_of(objects):
         _add_object(digest, object_, True, False)
     return digest.hexdigest()
+
+
+def in_edit_mode(target: Target) -> bool:
+    """Whether something of an asset is being edited: what it will be is not known before that ends."""
+    objects = _members(target)
+    return any(getattr(object_.data, "is_editmode", False) for object_ in (*objects, *_instances_of(objects)))
 
 
 def _members(target: Target) -> list[bpy.types.Object]:
@@ -187,21 +199,55 @@ def _instances_of(objects: Sequence[bpy.types.Object]) -> list[bpy.types.Object]
 def _add_object(digest: Any, object_: bpy.types.Object, place_counts: bool, bare: bool) -> None:
     matrix = np.array(object_.matrix_world, np.float32)
     digest.update((matrix if place_counts else matrix[:3, :3]).tobytes())
+    _add_shape(digest, object_)
+    for modifier in () if bare else object_.modifiers:
+        _add_values(digest, modifier)
+    for helper in _helpers(object_, bare):
+        _add_steps(digest, np.array(object_.matrix_world.inverted_safe() @ helper.matrix_world))
+        _add_shape(digest, helper)
+    for slot in object_.material_slots:
+        _add_material(digest, slot.material)
+
+
+def _helpers(object_: bpy.types.Object, bare: bool) -> list[bpy.types.Object]:
+    """The objects by which modifiers, and some parents, deform an object: armatures, lattices, hooks, targets."""
+    pointers = [object_.parent] if object_.parent_type in {"ARMATURE", "LATTICE"} else []
+    for modifier in () if bare else object_.modifiers:
+        kinds = modifier.bl_rna.properties
+        pointers += [getattr(modifier, prop.identifier) for prop in kinds if prop.type == "POINTER"]
+    return [each for each in pointers if isinstance(each, bpy.types.Object)]
+
+
+def _add_shape(digest: Any, object_: bpy.types.Object) -> None:
     if object_.type == "MESH":
-        _add_mesh(digest, object_.data)
+        with _out_of_edit_mode(object_) as mesh:
+            _add_mesh(digest, mesh)
     elif object_.type == "META":
         for ball in object_.data.elements:
             _add_values(digest, ball)
+    elif object_.type == "ARMATURE":
+        _add_steps(digest, np.array([bone.matrix for bone in object_.pose.bones]))
+    elif object_.type == "LATTICE":
+        _add_array(digest, object_.data.points, "co_deform", len(object_.data.points) * 3, np.float32)
     elif object_.type in SURFACE_TYPES:
         _add_values(digest, object_.data)
         for spline in object_.data.splines:
             _add_values(digest, spline)
             for points in (spline.points, spline.bezier_points):
                 digest.update(repr([_plain(point.co) for point in points]).encode())
-    for modifier in () if bare else object_.modifiers:
-        _add_values(digest, modifier)
-    for slot in object_.material_slots:
-        _add_material(digest, slot.material)
+
+
+@contextmanager
+def _out_of_edit_mode(object_: bpy.types.Object) -> Iterator[bpy.types.Mesh]:
+    """The mesh of an object, or in edit mode, where its arrays are empty, what it would be on leaving."""
+    if not object_.data.is_editmode:
+        yield object_.data
+        return
+    object_.update_from_editmode()
+    try:
+        yield object_.to_mesh()
+    finally:
+        object_.to_mesh_clear()
 
 
 def _add_mesh(digest: Any, mesh: bpy.types.Mesh) -> None:
@@ -213,10 +259,22 @@ def _add_mesh(digest: Any, mesh: bpy.types.Mesh) -> None:
     layer = next((layer for layer in mesh.uv_layers if layer.active_render), None)
     if layer is not None and len(layer.uv):
         _add_array(digest, layer.uv, "vector", len(layer.uv) * 2, np.float32)
+    digest.update(mesh.attributes.default_color_name.encode())
+    for colors in mesh.color_attributes:
+        digest.update(colors.name.encode())
+        _add_array(digest, colors.data, "color", len(colors.data) * 4, np.float32)
     if len(mesh.polygons):
         _add_array(digest, mesh.polygons, "material_index", len(mesh.polygons), np.int32)
     if mesh.shape_keys is not None:
         digest.update(repr([(key.name, key.value, key.mute) for key in mesh.shape_keys.key_blocks]).encode())
+
+
+def _add_steps(digest: Any, values: Floats) -> None:
+    """Numbers up to rounding, which differs where things are moved together."""
+    values = np.nan_to_num(values)
+    largest = np.abs(values).max(initial=0.0)
+    step = 1e-4 * 2.0 ** np.ceil(np.log2(largest)) if largest > 0 else 1.0
+    digest.update(np.rint(values / step).astype(np.int32).tobytes())
 
 
 def _add_array(digest: Any, collection: Any, key: str, size: int, kind: type) -> None:
@@ -238,10 +296,37 @@ def _add_material(digest: Any, material: bpy.types.Material | None) -> None:
             digest.update(repr(_plain(getattr(socket, "default_value", None))).encode())
         image = getattr(node, "image", None)
         if image is not None:
-            digest.update(repr((image.name, image.filepath, tuple(image.size), image.is_dirty)).encode())
+            _add_image(digest, image)
     for link in material.node_tree.links:
         names = (link.from_node.name, link.from_socket.identifier, link.to_node.name, link.to_socket.identifier)
         digest.update(repr(names).encode())
+
+
+def _add_image(digest: Any, image: bpy.types.Image) -> None:
+    """Of a painted image the pixels, of a file what tells that it was written since: not its folder, which saving
+    makes relative and which may move with the .blend."""
+    known: list[Any] = [image.source, image.colorspace_settings.name, image.alpha_mode]
+    if image.is_dirty:
+        pixels: NDArray[np.float32] = np.empty(len(image.pixels), np.float32)
+        image.pixels.foreach_get(pixels)
+        known.append(crc32(pixels.data))
+    elif image.packed_files:
+        known += [file.size for file in image.packed_files]
+    elif image.source == "GENERATED":
+        known += [image.generated_type, image.generated_width, image.generated_height, *image.generated_color]
+    else:
+        for path in image_paths(image):
+            known += [os.path.basename(path), *_written(path)]
+    digest.update(repr(known).encode())
+
+
+def _written(path: str) -> tuple[int, ...]:
+    """When a file was written, and its size; empty: there is none."""
+    try:
+        found = os.stat(path)
+    except (OSError, ValueError):
+        return ()
+    return found.st_mtime_ns, found.st_size
 
 
 _NOT_A_VALUE = {

@@ -71,8 +71,10 @@ def colors_changed() -> bool:
 
 def show_in_local_views(object_: bpy.types.Object) -> None:
     """Adds an object to the views that are local, in which a new object would not appear."""
-    for screen in bpy.data.screens:
-        for _, space in _spaces(screen):
+    for window in bpy.context.window_manager.windows:  # of a screen in no window, Blender 5.2 crashes
+        if object_.name not in window.view_layer.objects:
+            continue
+        for _, space in _spaces(window.screen):
             if space.local_view is not None:
                 object_.local_view_set(space, True)
 

@@ -15,7 +15,7 @@ Report = dict[str, dict[str, dict[str, Any]]]  # group, fact, "value" and "unit"
 GROUPS = ("reference", "distorted", "pair")
 SHARE = "share"  # what the unit of a share in [0, 1] begins with
 _UNKNOWN = "?"
-_SAID_BY_VALUE = {"yes or no", "number"}  # units that a reader of the value needs not be told
+_SAID_BY_VALUE = {"yes or no", "number", "by material"}  # units that a reader of the value needs not be told
 _APART = {"settings", "images"}  # not in the table: said elsewhere, and in lines of their own
 
 
@@ -41,11 +41,12 @@ def trust_lines(report: Report) -> list[Line]:
     """What trust_dict gave, line by line: the meshes' facts, the pair's, the images."""
     reference, distorted, pair = (report[group] for group in GROUPS)
     lines = [
-        Line(_label(name), (_text(item), _text(distorted[name])), _unit(item))
+        Line(_label(name), (_text(item), _text(distorted[name])), _unit(item, distorted[name]))
         for name, item in reference.items()
         if name not in _APART and not _is_long(item)
     ]
-    lines += [Line(_label(name), (_text(item),), _unit(item)) for name, item in pair.items() if name not in _APART]
+    apart = _APART if _was_baked(reference) or _was_baked(distorted) else {*_APART, "baked_at"}
+    lines += [Line(_label(name), (_text(item),), _unit(item)) for name, item in pair.items() if name not in apart]
     for group in GROUPS[:2]:
         lines += [
             Line(f"{_label(name)}, {group}", (_text(item),), _unit(item))
@@ -78,12 +79,17 @@ def _fact_dict(fact: Fact) -> dict[str, Any]:
 
 
 def _label(name: str) -> str:
-    return name.replace("_", " ").replace("uv ", "UV ")
+    return name.replace("_", " ").replace("uv ", "UV ").replace("non manifold", "non-manifold")
 
 
-def _unit(item: dict[str, Any]) -> str:
-    unit: str = item["why"] if item["value"] is None else item["unit"]
-    return "" if unit in _SAID_BY_VALUE else unit.removeprefix(SHARE).strip()
+def _unit(*items: dict[str, Any]) -> str:
+    """The unit of a line's values, and why one of them is not known."""
+    units = dict.fromkeys(item["why"] if item["value"] is None else item["unit"] for item in items)
+    return "; ".join(unit.removeprefix(SHARE).strip() for unit in units if unit not in _SAID_BY_VALUE)
+
+
+def _was_baked(group: dict[str, dict[str, Any]]) -> bool:
+    return "colors_from" in group and "baked" in group["colors_from"]["value"].values()
 
 
 def _is_long(item: dict[str, Any]) -> bool:

@@ -8,7 +8,17 @@ from typing import ClassVar
 import bpy
 from bpy.props import BoolProperty, FloatProperty, IntProperty, StringProperty
 
-from ..blender.decimate import LEAST_TRIANGLES, Found, Reader, Reduced, Wish, decimated_copy, reducing, scene_reader
+from ..blender.decimate import (
+    LEAST_TRIANGLES,
+    Found,
+    Reader,
+    Reduced,
+    Step,
+    Wish,
+    decimated_copy,
+    reducing,
+    scene_reader,
+)
 from ..blender.snapshot import fingerprint, target_of
 from ..metric.errors import FMQMError
 from ..metric.score import Stepper, Work
@@ -37,6 +47,8 @@ class FMQMDecimate(bpy.types.PropertyGroup):
         name="Max Triangles", description="The most triangles of the copy", default=10_000, min=LEAST_TRIANGLES
     )
     path: StringProperty(name="Path", description="Versions that were scored, one a line")
+    path_of: StringProperty(name="Path Of", description="Object whose versions they are")
+    found: IntProperty(name="Found", description="Line of the version that was chosen; -1: none", default=-1, min=-1)
 
 
 class FMQM_OT_decimate(SteppedOperator, bpy.types.Operator):  # noqa: N801
@@ -44,7 +56,7 @@ class FMQM_OT_decimate(SteppedOperator, bpy.types.Operator):  # noqa: N801
     bl_label = "Decimate to Quality"
     bl_description = (
         "Copy the active object with a live Decimate modifier, as strong as the target allows. The original stays as "
-        "it is. Esc cancels"
+        "it is and is hidden behind it. Esc cancels"
     )
     bl_options: ClassVar = {"UNDO"}  # no REGISTER: adjusting the last operation would search all over again
 
@@ -94,6 +106,7 @@ class FMQM_OT_decimate(SteppedOperator, bpy.types.Operator):  # noqa: N801
             self.report({"WARNING"}, f"{self._name} was changed meanwhile; search again")
             return {"CANCELLED"}
         best = found.best
+        _write_path(scene.fmqm.decimate, original.name, found)
         if not found.reached:
             self.report(
                 {"WARNING"},
@@ -102,15 +115,18 @@ class FMQM_OT_decimate(SteppedOperator, bpy.types.Operator):  # noqa: N801
             )
             return {"CANCELLED"}
         copy = decimated_copy(original, best.version.ratio, f"{original.name} FMQM {found.target:.2f}")
-        scene.fmqm.decimate.path = _path_text(found)
         context.view_layer.update()
+        hidden = ""
         if copy.name in context.view_layer.objects:  # not in another scene, or where its collection is excluded
             for object_ in context.selected_objects:
                 object_.select_set(False)
             context.view_layer.objects.active = copy
             copy.select_set(True)
+            original.hide_set(True)  # the two would flicker, each as near to the viewer as the other
+            hidden = f"; {original.name} is hidden, Alt H shows it"
         self.report(
-            {"INFO"}, f"{copy.name}: {best.triangles:,} of {reduced.triangles:,} triangles, FMQM {best.fmqm:.4f}"
+            {"INFO"},
+            f"{copy.name}: {best.triangles:,} of {reduced.triangles:,} triangles, FMQM {best.fmqm:.4f}{hidden}",
         )
         return {"FINISHED"}
 
@@ -136,13 +152,17 @@ def _attempt(read: Reader, wish: Wish, settings: Settings) -> Work[Reduced | FMQ
     return searching.result
 
 
-def _path_text(found: Found) -> str:
+def _write_path(decimate: FMQMDecimate, name: str, found: Found) -> None:
     """Its versions, from the most triangles down; "about" where few patches were looked at."""
-    lines = []
-    for step in sorted(found.path, key=lambda step: (-step.triangles, step.quick)):
-        score = "nothing left" if step.fmqm is None else f"{step.fmqm:.4f}"
-        lines.append(f"{step.triangles:,} triangles: {'about ' if step.quick else ''}{score}")
-    return "\n".join(dict.fromkeys(lines))
+    steps = sorted(found.path, key=lambda step: (-step.triangles, step.quick))
+    lines = list(dict.fromkeys(map(_step_text, steps)))
+    decimate.path, decimate.path_of = "\n".join(lines), name
+    decimate.found = lines.index(_step_text(found.best)) if found.reached else -1
+
+
+def _step_text(step: Step) -> str:
+    score = "nothing left" if step.fmqm is None else f"{step.fmqm:.4f}"
+    return f"{step.triangles:,} triangles: {'about ' if step.quick else ''}{score}"
 
 
 class FMQM_PT_decimate(bpy.types.Panel):  # noqa: N801
@@ -170,8 +190,9 @@ class FMQM_PT_decimate(bpy.types.Panel):  # noqa: N801
         if decimate.path:
             column = layout.column(align=True)
             column.scale_y = 0.8
-            for line in decimate.path.splitlines():
-                column.label(text=line, translate=False)
+            column.label(text=decimate.path_of, icon="OBJECT_DATA", translate=False)
+            for number, line in enumerate(decimate.path.splitlines()):
+                column.label(text=line, icon="CHECKMARK" if number == decimate.found else "BLANK1", translate=False)
 
 
 CLASSES = (FMQM_OT_decimate, FMQM_PT_decimate)

@@ -9,7 +9,7 @@ from typing import ClassVar
 import bpy
 
 from ..blender.lods import find_lods
-from .properties import is_asset
+from .properties import is_asset, kept
 from .scene import FMQMScene
 
 
@@ -42,8 +42,8 @@ def set_reference(fmqm: FMQMScene, asset: bpy.types.Object | bpy.types.Collectio
 
 
 def reference_of(fmqm: FMQMScene) -> bpy.types.Object | bpy.types.Collection | None:
-    """The asset that stands as the reference in the panel."""
-    return fmqm.reference if fmqm.reference_kind == "OBJECT" else fmqm.reference_collection
+    """The asset that stands as the reference in the panel; None if that was deleted."""
+    return kept(fmqm.reference) if fmqm.reference_kind == "OBJECT" else fmqm.reference_collection
 
 
 class FMQM_OT_use_selection(bpy.types.Operator):  # noqa: N801
@@ -90,7 +90,9 @@ class FMQM_OT_find_lods(bpy.types.Operator):  # noqa: N801
         fmqm = context.scene.fmqm
         set_reference(fmqm, found.levels[0])
         set_compared(fmqm, found.levels[1:])
-        self.report({"INFO"}, f"{found.levels[0].name} and {len(found.levels) - 1} levels, by {found.how}")
+        number = len(found.levels) - 1
+        levels = "1 level" if number == 1 else f"{number} levels"
+        self.report({"INFO"}, f"{found.levels[0].name} and {levels}, by {found.how}")
         return {"FINISHED"}
 
 

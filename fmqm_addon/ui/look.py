@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 import bpy
@@ -32,7 +33,7 @@ _FIELD_ITEMS = [item for item in _LAYER_ITEMS if not layers.LAYERS[item[0]].per_
 
 
 def _recolor(look: FMQMLook, _: bpy.types.Context) -> None:
-    show.update_cloud(look.id_data)
+    show.recolor_cloud(look.id_data)
     show.recolor_painted(look.id_data)
 
 
@@ -46,7 +47,7 @@ def _draw_slice(look: FMQMLook, _: bpy.types.Context) -> None:
 
 
 def _rebuild_slice(look: FMQMLook, _: bpy.types.Context) -> None:
-    if pointcloud.find_object(pointcloud.SLICE) is not None:
+    if pointcloud.find_object(look.id_data, pointcloud.SLICE) is not None:
         _quietly(lambda: show.show_slice(look.id_data))
 
 
@@ -55,7 +56,7 @@ def _resize(look: FMQMLook, _: bpy.types.Context) -> None:
 
 
 def _move(look: FMQMLook, _: bpy.types.Context) -> None:
-    show.move_cloud(look.id_data)
+    _quietly(lambda: show.move_shown(look.id_data))
 
 
 def _focus(look: FMQMLook, context: bpy.types.Context) -> None:
@@ -224,10 +225,9 @@ class FMQM_OT_worst_step(_Shows, bpy.types.Operator):  # noqa: N801
     def act(self, context: bpy.types.Context) -> None:
         look = show.look_of(context.scene)
         uid, _, _ = show.measured_row(context.scene)
-        fresh = not look.focused or look.worst_uid != uid
-        if look.worst_uid != uid or pointcloud.find_object(pointcloud.CLOUD) is None:
+        if look.worst_uid != uid or pointcloud.find_object(context.scene, pointcloud.CLOUD) is None:
             show.show_cloud(context.scene)
-        if not fresh and look.worst:  # the first press shows the worst one
+        if look.focused and look.worst:  # the first press shows the worst one
             show.choose_worst(look, (look.worst_index + self.step) % len(look.worst))
         show.focus_patch(context.scene, context.area)
 
@@ -300,7 +300,7 @@ class FMQM_OT_unit_pick(bpy.types.Operator):  # noqa: N801
 
     def invoke(self, context: bpy.types.Context, _: bpy.types.Event) -> set[str]:
         self._area = context.area
-        if pointcloud.find_object(pointcloud.CLOUD) is None:
+        if pointcloud.find_object(context.scene, pointcloud.CLOUD) is None:
             show.show_cloud(context.scene)
         context.window.cursor_modal_set("CROSSHAIR")
         context.workspace.status_text_set(_STATUS)
@@ -365,9 +365,8 @@ class FMQM_OT_clear(bpy.types.Operator):  # noqa: N801
             return False
         return True
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, _: bpy.types.Context) -> set[str]:
         show.clear()
-        show.look_of(context.scene).focused = False
         return {"FINISHED"}
 
 
@@ -460,8 +459,8 @@ class FMQM_PT_ncf(_SubPanel, bpy.types.Panel):  # noqa: N801
 
 
 def _say_if_gone(layout: Any, context: bpy.types.Context) -> None:
-    rows, index = context.scene.fmqm.rows, context.scene.fmqm.row_index
-    if 0 <= index < len(rows) and not rows[index].error and session.get(rows[index].uid) is None:
+    row = overlay.chosen_row(context.scene)
+    if row is not None and not row.error and session.get(row.uid) is None:
         layout.label(text="Samples are gone: Measure Again", icon="INFO")
 
 
@@ -486,18 +485,20 @@ CLASSES: tuple[type, ...] = (
 
 
 def row_chosen(scene: bpy.types.Scene) -> None:
-    """For the results list: the cloud, if one is shown, becomes that of the row just chosen or measured."""
-    show.update_cloud(scene)
+    """For the results list: what is shown becomes that of the row just chosen or measured."""
+    _quietly(lambda: show.follow_row(scene))
 
 
 def _watch_slice() -> None:
     """Called at each drawing of a view; the work waits for a timer, outside of the drawing."""
-    if show.slice_has_moved() and not bpy.app.timers.is_registered(_redraw_slice):
+    if show.slice_has_moved(bpy.context.scene) and not bpy.app.timers.is_registered(_redraw_slice):
         bpy.app.timers.register(_redraw_slice, first_interval=_SLICE_REST)
 
 
 def _redraw_slice() -> None:
-    _quietly(lambda: show.draw_slice(bpy.context.scene))
+    for scene in bpy.data.scenes:
+        if show.slice_has_moved(scene):
+            _quietly(partial(show.draw_slice, scene))
 
 
 def register() -> None:
@@ -506,6 +507,7 @@ def register() -> None:
 
 
 def unregister() -> None:
+    show.clear()  # nothing could take it away later
     overlay.on_draw = None
     overlay.unregister()
     if bpy.app.timers.is_registered(_redraw_slice):

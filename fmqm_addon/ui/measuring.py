@@ -28,7 +28,10 @@ def why_not(fmqm: FMQMScene) -> str:
     """Why there is nothing to measure yet, for the greyed-out button; "" if there is. Cheap: it runs at each redraw."""
     reference = reference_of(fmqm)
     if reference is None:
-        return "Choose a reference: the original"
+        gone = fmqm.reference_kind == "OBJECT" and fmqm.reference is not None
+        return (
+            f"{fmqm.reference.name} is gone; choose another reference" if gone else "Choose a reference: the original"
+        )
     compared = [target for item in fmqm.compared if (target := item_target(item)) is not None]
     if not compared:
         return "Add an object to compare with the reference"
@@ -119,9 +122,12 @@ def _row_key(row: FMQMRow) -> tuple[Target, Target]:
 
 
 def _write_row(fmqm: FMQMScene, outcome: Outcome, settings_text: str) -> None:
-    """Replaces the row of the same two assets, or adds one."""
+    """Replaces the row of the same two assets, or adds one. Scores of what has been deleted meanwhile stay."""
     key = (outcome.reference_target, outcome.target)
-    row = next((row for row in fmqm.rows if _row_key(row) == key), None) or fmqm.rows.add()
+    row = next((row for row in fmqm.rows if _row_key(row) == key), None)
+    if row is not None and row.scores and outcome.error and any(target.is_gone() for target in key):
+        return
+    row = row or fmqm.rows.add()
     session.drop(row.uid)
     row.uid = uuid.uuid4().hex
     row.name, row.kind = outcome.target.name, outcome.target.kind

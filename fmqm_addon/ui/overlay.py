@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from ..blender import pointcloud
 from ..metric.spatial import Floats
 from . import session
+from .properties import FMQMRow
 
 LEGEND = "fmqm_legend"  # custom property of the objects that have a legend: report.layers.Legend as JSON
 _FONT = 0
@@ -85,21 +86,22 @@ def unregister() -> None:
         bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), "WINDOW")
 
 
+def chosen_row(scene: bpy.types.Scene) -> FMQMRow | None:
+    """The chosen row of a scene's results."""
+    rows, index = scene.fmqm.rows, scene.fmqm.row_index
+    return rows[index] if 0 <= index < len(rows) else None
+
+
 def legends() -> list[dict[str, Any]]:
     """The legends of our objects that this view shows."""
     space = bpy.context.space_data
     shown: list[dict[str, Any]] = []
-    for object_ in _collection_objects():
+    for object_ in pointcloud.objects(bpy.context.scene):
         if LEGEND in object_ and object_.visible_get(viewport=space):
             legend = json.loads(object_[LEGEND])
             if legend not in shown:  # points and painted surface share theirs
                 shown.append(legend)
     return shown
-
-
-def _collection_objects() -> list[bpy.types.Object]:
-    found = next((c for c in bpy.data.collections if c.library is None and pointcloud.TAG in c), None)
-    return [] if found is None else list(found.objects)
 
 
 def _draw_legends() -> None:
@@ -112,13 +114,16 @@ def _draw_legends() -> None:
     x, y = _corner(ink)
     for legend in legends():
         x += _draw_legend(ink, legend, x, y) + ink.px(_GAP)
-    if figure is not None and _belongs_here(figure):
+    if figure is not None and belongs_here(figure):
         _draw_figure(ink, figure, x, y)
 
 
-def _belongs_here(shown: UnitFigure) -> bool:
-    """Its row is still there, in this file and scene."""
-    return shown.scene == bpy.context.scene.name and session.get(shown.uid) is not None
+def belongs_here(shown: UnitFigure) -> bool:
+    """Its row is the chosen one of this scene, and was measured in this file; undo may have taken it away."""
+    scene = bpy.context.scene
+    row = chosen_row(scene)
+    here = row is not None and row.uid == shown.uid and shown.scene == scene.name
+    return here and session.get(shown.uid) is not None
 
 
 class _Ink:
@@ -265,7 +270,7 @@ def _picture_batch(picture: UnitPicture) -> Any:
 
 def _draw_marks() -> None:
     """The chosen sample, its way to the surface and the rim of its tangent unit, seen through everything."""
-    if figure is None or not _belongs_here(figure) or not bpy.context.space_data.overlay.show_overlays:
+    if figure is None or not belongs_here(figure) or not bpy.context.space_data.overlay.show_overlays:
         return
     points = figure.lines.reshape(-1, 3).astype(np.float32)
     shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")

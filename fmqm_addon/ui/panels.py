@@ -11,11 +11,11 @@ from bl_ui.utils import PresetPanel
 from ..blender.space import PLACE_LABELS
 from ..metric.score import COLUMNS
 from ..report.pair import SHOWN
-from ..report.trust import trust_lines
+from ..report.trust import Line, trust_lines
 from . import session
 from .measuring import why_not
-from .properties import FMQMItem, FMQMRow, row_attribution, row_reverse, row_scores, row_stderr, row_trust
-from .results import EXPLAINED, active_row
+from .properties import FMQMItem, FMQMRow, item_target, row_attribution, row_reverse, row_scores, row_stderr, row_trust
+from .results import EXPLAINED, active_row, comparable, settings_name
 from .scene import FMQMScene
 
 _WIDE = 330  # pixels at scale 1: from here on the rows have room for the four features
@@ -32,14 +32,18 @@ class _Sidebar:
 
 def wrapped(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "NONE") -> None:
     """A label of as many lines as the sidebar's width asks for."""
-    scale = context.preferences.system.ui_scale
-    room = max(12, int((context.region.width / scale - (70 if icon != "NONE" else 50)) / _CHARACTER))
     column = layout.column(align=True)
     column.scale_y = 0.8
     first = True
-    for line in _lines(text, room):
+    for line in _lines(text, _room(context, 70 if icon != "NONE" else 50)):
         column.label(text=line, icon=icon if first else ("BLANK1" if icon != "NONE" else "NONE"))
         first = False
+
+
+def _room(context: bpy.types.Context, margin: int) -> int:
+    """How many characters fit beside the margin, in pixels at scale 1."""
+    scale = context.preferences.system.ui_scale
+    return max(12, int((context.region.width / scale - margin) / _CHARACTER))
 
 
 def _lines(text: str, room: int) -> list[str]:
@@ -64,23 +68,25 @@ class FMQM_UL_compared(bpy.types.UIList):  # noqa: N801
         _active_data: FMQMScene,
         _active_property: str,
     ) -> None:
-        if item.collection is not None:
-            layout.label(text=item.collection.name, icon="OUTLINER_COLLECTION", translate=False)
-        elif item.object is not None:
-            icon = "OBJECT_DATA" if item.object.type == "MESH" else "EMPTY_DATA"
-            layout.label(text=item.object.name, icon=icon, translate=False)
+        target = item_target(item)
+        if target is None:
+            name = item.name if item.object is None else item.object.name
+            layout.label(text=f"{name} (gone)", icon="ERROR", translate=False)
+        elif isinstance(target, bpy.types.Collection):
+            layout.label(text=target.name, icon="OUTLINER_COLLECTION", translate=False)
         else:
-            layout.label(text=f"{item.name} (gone)", icon="ERROR", translate=False)
+            icon = "OBJECT_DATA" if target.type == "MESH" else "EMPTY_DATA"
+            layout.label(text=target.name, icon=icon, translate=False)
 
 
 class FMQM_UL_rows(bpy.types.UIList):  # noqa: N801
-    """Name and score; in a wide sidebar the four features too."""
+    """Name and score, greyed at other settings than the chosen row's; in a wide sidebar the four features too."""
 
     def draw_item(
         self,
         context: bpy.types.Context,
         layout: bpy.types.UILayout,
-        _data: FMQMScene,
+        fmqm: FMQMScene,
         row: FMQMRow,
         _icon: int,
         _active_data: FMQMScene,
@@ -101,6 +107,8 @@ class FMQM_UL_rows(bpy.types.UIList):  # noqa: N801
         split = layout.split(factor=0.36 if wide else 0.68)
         split.label(text=row.name, icon=icon, translate=False)
         numbers = split.row()
+        chosen = active_row(fmqm)
+        numbers.active = chosen is None or comparable(row, chosen)
         for name in SHOWN if wide else SHOWN[:1]:
             numbers.label(text=f"{scores[name]:.4f}" if name == "FMQM" else f"{scores[name]:.2f}")
 
@@ -288,10 +296,38 @@ class FMQM_PT_trust(_Sidebar, bpy.types.Panel):  # noqa: N801
             return
         column = self.layout.column(align=True)
         for line in trust_lines(report):
-            split = column.split(factor=0.5, align=True)
-            split.label(text=line.label[:1].upper() + line.label[1:])
-            # One value where both meshes have the same: the sidebar is narrow.
-            split.label(text=" / ".join(dict.fromkeys(line.values)), translate=False)
+            _draw_fact(column, context, line)
+
+
+def _draw_fact(layout: bpy.types.UILayout, context: bpy.types.Context, line: Line) -> None:
+    """In one line where there is room for it; else its unit, or why it is not known, goes below, and a long value."""
+    # What reports call distorted is Compared here. One value where both have the same: the sidebar is narrow.
+    label, unit = (text.replace("distorted", "compared") for text in (line.label, line.unit))
+    value = " / ".join(dict.fromkeys(line.values))
+    if unit.partition(" ")[0] in label.split():  # vertices welded are vertices
+        unit = ""
+    room = _room(context, 40) - len(label) - 2
+    label, whole = label[:1].upper() + label[1:], f"{value} {unit}".strip()
+    if len(value) > room:
+        layout.label(text=label)
+        _draw_below(layout, context, whole)
+        return
+    row = layout.row(align=True)
+    row.label(text=label)
+    right = row.row(align=True)
+    right.alignment = "RIGHT"
+    right.label(text=whole if len(whole) <= room else value, translate=False)
+    if len(whole) > room:
+        note = layout.column(align=True)
+        note.active = False
+        _draw_below(note, context, unit)
+
+
+def _draw_below(layout: bpy.types.UILayout, context: bpy.types.Context, text: str) -> None:
+    """Indented."""
+    row = layout.row(align=True)
+    row.separator(factor=2.0)
+    wrapped(row, context, text)
 
 
 def _draw_row(layout: bpy.types.UILayout, context: bpy.types.Context, fmqm: FMQMScene, row: FMQMRow) -> None:
@@ -303,7 +339,7 @@ def _draw_row(layout: bpy.types.UILayout, context: bpy.types.Context, fmqm: FMQM
     if scores is None:
         return
     if row.uid in session.stale:
-        wrapped(layout, context, f"{session.stale[row.uid]} since; measure again", icon="FILE_REFRESH")
+        wrapped(layout, context, session.stale[row.uid], icon="FILE_REFRESH")
     column = layout.column(align=True)
     for name in SHOWN:
         split = column.split(factor=0.5, align=True)
@@ -328,11 +364,16 @@ def _draw_row(layout: bpy.types.UILayout, context: bpy.types.Context, fmqm: FMQM
         ("Against", reference),
         ("Triangles", f"{row.triangles:,} ({row.share:.3g} %)"),
         ("Space", _SHORT_SPACE.get(row.space, row.space.capitalize())),
+        ("Settings", settings_name(row)),
+        ("Patches", f"{row.patches:,}"),
+        ("Samples", f"{row.samples:,}"),
         ("Time", f"{row.seconds:.2f} s"),
     ):
         split = column.split(factor=0.5, align=True)
         split.label(text=f"    {label}")
         split.label(text=text, translate=False)
+    if not all(comparable(row, other) for other in fmqm.rows if other.scores):
+        wrapped(layout, context, "Scores in grey were measured at other settings: do not compare", icon="INFO")
     if attribution is not None:
         phrase = attribution["phrase"]
         wrapped(layout, context, phrase[:1].upper() + phrase[1:], icon="INFO")

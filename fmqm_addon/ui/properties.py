@@ -44,8 +44,19 @@ class FMQMItem(bpy.types.PropertyGroup):
     )
 
 
+def kept(object_: bpy.types.Object | None) -> bpy.types.Object | None:
+    """None for an object that was deleted: it stays in the file, in no scene, as long as a property points at it.
+
+    Cheap: panels ask at each redraw.
+    """
+    if object_ is None or bpy.context.view_layer.objects.get(object_.name) == object_:
+        return object_
+    return object_ if object_.users_scene else None  # which goes through all objects
+
+
 def item_target(item: FMQMItem) -> bpy.types.Object | bpy.types.Collection | None:
-    return item.object or item.collection
+    """What an item stands for; None if that was deleted."""
+    return kept(item.object) or item.collection
 
 
 class FMQMRow(bpy.types.PropertyGroup):

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 import os
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import bpy
 import numpy as np
@@ -14,6 +14,7 @@ from bpy.props import EnumProperty, StringProperty
 from .. import VERSION
 from ..metric.errors import FMQMError
 from ..metric.score import COLUMNS
+from ..metric.settings import PRESETS, SETTING_NAMES, Settings
 from ..metric.spatial import Floats
 from ..report.fields import save_fields
 from ..report.files import write_text
@@ -48,6 +49,26 @@ assert set(EXPLAINED) == set(SHOWN)
 def active_row(fmqm: FMQMScene) -> FMQMRow | None:
     """The chosen row of the results."""
     return fmqm.rows[fmqm.row_index] if 0 <= fmqm.row_index < len(fmqm.rows) else None
+
+
+def settings_name(row: FMQMRow) -> str:
+    """The preset that a row was measured with, or Custom."""
+    used = _settings_that_count(row)
+    for name, values in PRESETS.items():
+        preset = Settings(**values).as_dict()
+        if all(preset[each] == value for each, value in used.items()):
+            return name.capitalize()
+    return "Custom"
+
+
+def comparable(row: FMQMRow, other: FMQMRow) -> bool:
+    """Whether the scores of two rows may be compared: they were measured at equal settings."""
+    return row.settings == other.settings or _settings_that_count(row) == _settings_that_count(other)
+
+
+def _settings_that_count(row: FMQMRow) -> dict[str, Any]:
+    used = json.loads(row.settings)
+    return {name: used[name] for name in SETTING_NAMES if name != "seed"}
 
 
 def pair_of(row: FMQMRow) -> PairScore:
@@ -163,7 +184,8 @@ class FMQM_OT_copy_results(bpy.types.Operator):  # noqa: N801
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         context.window_manager.clipboard = table_text([pair_of(row) for row in context.scene.fmqm.rows])
-        self.report({"INFO"}, f"{len(context.scene.fmqm.rows)} results copied")
+        number = len(context.scene.fmqm.rows)
+        self.report({"INFO"}, "1 result copied" if number == 1 else f"{number} results copied")
         return {"FINISHED"}
 
 
@@ -209,6 +231,9 @@ class FMQM_OT_save_results(bpy.types.Operator):  # noqa: N801
         return changed
 
     def execute(self, context: bpy.types.Context) -> set[str]:
+        if not os.path.basename(self.filepath):
+            self.report({"ERROR"}, "No file is named; say which one to write to")
+            return {"CANCELLED"}
         fmqm = context.scene.fmqm
         row = active_row(fmqm) or fmqm.rows[0]
         path = bpy.path.abspath(self._with_suffix())

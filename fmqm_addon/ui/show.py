@@ -50,13 +50,53 @@ def measured_row(scene: bpy.types.Scene) -> tuple[str, str, session.Measured]:
     Raises:
         FMQMError: no row, or its samples are gone.
     """
-    rows, index = scene.fmqm.rows, scene.fmqm.row_index
-    if not 0 <= index < len(rows):
+    row = overlay.chosen_row(scene)
+    if row is None:
         raise FMQMError("there is no result yet; press Measure Quality first")
-    measured = session.get(rows[index].uid)
+    measured = session.get(row.uid)
     if measured is None:
-        raise FMQMError(f"{rows[index].name}: {AGAIN}")
-    return rows[index].uid, rows[index].name, measured
+        raise FMQMError(f"{row.name}: {AGAIN}")
+    return row.uid, row.name, measured
+
+
+def follow_row(scene: bpy.types.Scene) -> None:
+    """What is shown becomes that of the row just chosen or measured; hidden things stay hidden.
+
+    Raises:
+        FMQMError: the row has nothing to show. The list of worst places is empty then, the rest stays.
+    """
+    look, row = look_of(scene), overlay.chosen_row(scene)
+    if row is None or row.uid != look.worst_uid:
+        look.worst.clear()
+        look.worst_uid = ""
+    uid, _, measured = measured_row(scene)
+    builders = {
+        pointcloud.CLOUD: _build_cloud,
+        pointcloud.PAINTED: _build_painted,
+        pointcloud.SHELLS: _build_shells,
+        pointcloud.SLICE: draw_slice,
+    }
+    for kind, build in builders.items():
+        shown = pointcloud.find_object(scene, kind)
+        if shown is not None and shown.get(_UID) != uid:
+            build(scene)
+    _fill_worst(look, measured.comparison.result, uid)
+    _follow_unit(scene)
+
+
+def move_shown(scene: bpy.types.Scene) -> None:
+    """Moves what is shown to the place that the look says."""
+    for kind in (pointcloud.CLOUD, pointcloud.PAINTED, pointcloud.SHELLS):
+        shown = pointcloud.find_object(scene, kind)
+        measured = _measured_of(shown)
+        if shown is not None and measured is not None:
+            shown.matrix_world = Matrix(cloud_matrix(measured, look_of(scene).place).tolist())
+    _follow_unit(scene)
+
+
+def _measured_of(shown: bpy.types.Object | None) -> session.Measured | None:
+    """What an object of ours was made from, if that is still in memory."""
+    return None if shown is None else session.get(shown.get(_UID, ""))
 
 
 # --- The cloud
@@ -68,6 +108,13 @@ def show_cloud(scene: bpy.types.Scene) -> bpy.types.Object:
     Raises:
         FMQMError: nothing to show.
     """
+    cloud = _build_cloud(scene)
+    _appear(cloud)
+    viewport.show_colors()
+    return cloud
+
+
+def _build_cloud(scene: bpy.types.Scene) -> bpy.types.Object:
     uid, _, measured = measured_row(scene)
     look = look_of(scene)
     result = measured.comparison.result
@@ -83,17 +130,16 @@ def show_cloud(scene: bpy.types.Scene) -> bpy.types.Object:
     )
     cloud.hide_select = True  # clicks go to the user's own objects
     cloud[_UID], cloud[_SPACING] = uid, spacing
+    look.focused = False
     _fill_worst(look, result, uid)
-    _appear(cloud)
     recolor_cloud(scene)
-    viewport.show_colors()
     return cloud
 
 
 def recolor_cloud(scene: bpy.types.Scene) -> None:
     """Gives the cloud the colors and the legend of the chosen layer, unless its samples are gone."""
-    cloud = pointcloud.find_object(pointcloud.CLOUD)
-    measured = None if cloud is None else session.get(cloud.get(_UID, ""))
+    cloud = pointcloud.find_object(scene, pointcloud.CLOUD)
+    measured = _measured_of(cloud)
     if cloud is None or measured is None:
         return
     look = look_of(scene)
@@ -105,31 +151,10 @@ def recolor_cloud(scene: bpy.types.Scene) -> None:
     viewport.redraw()
 
 
-def update_cloud(scene: bpy.types.Scene) -> None:
-    """Brings the cloud, if there is one, up to date: with the chosen layer, and the chosen row."""
-    cloud = pointcloud.find_object(pointcloud.CLOUD)
-    if cloud is None:
-        return
-    rows, index = scene.fmqm.rows, scene.fmqm.row_index
-    chosen = rows[index].uid if 0 <= index < len(rows) else ""
-    if chosen != cloud.get(_UID) and session.get(chosen) is not None:
-        show_cloud(scene)
-    else:
-        recolor_cloud(scene)
-
-
 def resize_cloud(scene: bpy.types.Scene) -> None:
-    cloud = pointcloud.find_object(pointcloud.CLOUD)
+    cloud = pointcloud.find_object(scene, pointcloud.CLOUD)
     if cloud is not None:
         pointcloud.resize(cloud, look_of(scene).point_size * POINT * cloud.get(_SPACING, 0.0))
-
-
-def move_cloud(scene: bpy.types.Scene) -> None:
-    """To the place that the look says."""
-    cloud = pointcloud.find_object(pointcloud.CLOUD)
-    measured = None if cloud is None else session.get(cloud.get(_UID, ""))
-    if cloud is not None and measured is not None:
-        cloud.matrix_world = Matrix(cloud_matrix(measured, look_of(scene).place).tolist())
 
 
 def cloud_matrix(measured: session.Measured, place: str) -> Floats:
@@ -161,6 +186,7 @@ def _outwards(result: Result) -> Floats:
 
 def _appear(object_: bpy.types.Object) -> None:
     bpy.context.view_layer.update()
+    pointcloud.reveal(object_, bpy.context.view_layer)
     viewport.show_in_local_views(object_)
 
 
@@ -174,18 +200,19 @@ def _explain(
     note: str = "",
 ) -> None:
     """Stores the legend on the object, where drawing, saving and undo find it."""
-    units = scene.unit_settings
-
-    def length_text(value: float) -> str:
-        if units.system == "NONE":
-            return f"{value:.3g}"
-        text: str = bpy.utils.units.to_string(
-            units.system, "LENGTH", value * units.scale_length, precision=3, split_unit=False
-        )
-        return text
-
-    legend = layers.legend(layer, ends, name, result, length_text)
+    legend = layers.legend(layer, ends, name, result, lambda length: _length_text(scene, length))
     object_[overlay.LEGEND] = json.dumps(replace(legend, note=note or legend.note).as_dict())
+
+
+def _length_text(scene: bpy.types.Scene, length: float) -> str:
+    """A length in scene units as the scene's unit settings want it."""
+    units = scene.unit_settings
+    if units.system == "NONE":
+        return f"{length:.3g}"
+    text: str = bpy.utils.units.to_string(
+        units.system, "LENGTH", length * units.scale_length, precision=3, split_unit=False
+    )
+    return text
 
 
 # --- The painted surface
@@ -197,6 +224,11 @@ def paint_surface(scene: bpy.types.Scene) -> None:
     Raises:
         FMQMError: nothing to show.
     """
+    _appear(_build_painted(scene))
+    viewport.show_colors()
+
+
+def _build_painted(scene: bpy.types.Scene) -> bpy.types.Object:
     uid, _, measured = measured_row(scene)
     mesh = measured.comparison.result.patch_mesh
     painted = pointcloud.build_surface(
@@ -209,14 +241,13 @@ def paint_surface(scene: bpy.types.Scene) -> None:
     )
     painted[_UID] = uid
     recolor_painted(scene)
-    _appear(painted)
-    viewport.show_colors()
+    return painted
 
 
 def recolor_painted(scene: bpy.types.Scene) -> None:
     """Gives the painted copy, if there is one, the colors and the legend of the chosen layer."""
-    painted = pointcloud.find_object(pointcloud.PAINTED)
-    measured = None if painted is None else session.get(painted.get(_UID, ""))
+    painted = pointcloud.find_object(scene, pointcloud.PAINTED)
+    measured = _measured_of(painted)
     if painted is None or measured is None:
         return
     look = look_of(scene)
@@ -266,9 +297,11 @@ def focus_patch(scene: bpy.types.Scene, area: bpy.types.Area | None) -> None:
     """
     look = look_of(scene)
     uid, _, measured = measured_row(scene)
-    cloud = pointcloud.find_object(pointcloud.CLOUD)
+    cloud = pointcloud.find_object(scene, pointcloud.CLOUD)
     if cloud is None or cloud.get(_UID) != uid:
         cloud = show_cloud(scene)
+    else:
+        _appear(cloud)
     if not 0 <= look.worst_index < len(look.worst):
         raise FMQMError("the result has no patches")
     patch = look.worst[look.worst_index].patch
@@ -291,7 +324,7 @@ def focus_patch(scene: bpy.types.Scene, area: bpy.types.Area | None) -> None:
 def show_all_patches(scene: bpy.types.Scene) -> None:
     look = look_of(scene)
     look.focused = False
-    cloud = pointcloud.find_object(pointcloud.CLOUD)
+    cloud = pointcloud.find_object(scene, pointcloud.CLOUD)
     if cloud is not None:
         shown = np.ones(len(cloud.data.vertices) // 4, bool)
         pointcloud.resize(cloud, look.point_size * POINT * cloud.get(_SPACING, 0.0), shown)
@@ -308,7 +341,6 @@ def choose_worst(look: FMQMLook, index: int) -> None:
 
 
 def _fill_worst(look: FMQMLook, result: Result, uid: str) -> None:
-    look.focused = False
     if look.worst_uid == uid and len(look.worst):
         return
     look.worst.clear()
@@ -330,6 +362,12 @@ def show_shells(scene: bpy.types.Scene) -> None:
     Raises:
         FMQMError: nothing to show.
     """
+    _appear(_build_shells(scene))
+    viewport.show_colors()
+    viewport.redraw()
+
+
+def _build_shells(scene: bpy.types.Scene) -> bpy.types.Object:
     uid, _, measured = measured_row(scene)
     look = look_of(scene)
     surface = measured.reference if look.shell_field == "REFERENCE" else measured.comparison.distorted
@@ -358,12 +396,12 @@ def show_shells(scene: bpy.types.Scene) -> None:
     pointcloud.recolor(object_, colors.astype(np.float64))
     step = world_length(measured) * look.shell_distance / 100
     legend = layers.Legend(
-        f"{probe.SHELLS} Shells of {surface.name}", f"{step:.3g} apart", note="colors as in the textures"
+        f"{probe.SHELLS} Shells of {surface.name}",
+        f"{_length_text(scene, step)} apart",
+        note="colors as in the textures",
     )
     object_[overlay.LEGEND] = json.dumps(legend.as_dict())
-    _appear(object_)
-    viewport.show_colors()
-    viewport.redraw()
+    return object_
 
 
 def show_slice(scene: bpy.types.Scene) -> bpy.types.Object:
@@ -392,10 +430,10 @@ def draw_slice(scene: bpy.types.Scene) -> None:
     Raises:
         FMQMError: nothing to show.
     """
-    plane = pointcloud.find_object(pointcloud.SLICE)
+    plane = pointcloud.find_object(scene, pointcloud.SLICE)
     if plane is None:
         return
-    _, name, measured = measured_row(scene)
+    uid, name, measured = measured_row(scene)
     look = look_of(scene)
     resolution = plane.data.size[0]
     to_frame = np.linalg.inv(cloud_matrix(measured, "REFERENCE")) @ np.array(plane.matrix_world, np.float64)
@@ -409,15 +447,15 @@ def draw_slice(scene: bpy.types.Scene) -> None:
     cut = dist.sdf if look.slice_layer.endswith("COMPARED") else ref.sdf
     colors[_borders((cut < 0).reshape(resolution, resolution)).ravel()] = OUTLINE
     pointcloud.draw_slice(plane, colors)
-    plane[_SLICE_MATRIX] = _flat(plane)
+    plane[_UID], plane[_SLICE_MATRIX] = uid, _flat(plane)
     which = "compared" if look.slice_layer.endswith("COMPARED") else "reference"
     _explain(scene, plane, look.slice_layer, ends, measured.comparison.result, name, f"dark line: {which}")
     viewport.redraw()
 
 
-def slice_has_moved() -> bool:
+def slice_has_moved(scene: bpy.types.Scene) -> bool:
     """Whether the slice is elsewhere than where it was drawn; cheap enough for each drawing of the view."""
-    plane = pointcloud.find_object(pointcloud.SLICE)
+    plane = pointcloud.find_object(scene, pointcloud.SLICE)
     return plane is not None and _SLICE_MATRIX in plane and list(plane[_SLICE_MATRIX]) != _flat(plane)
 
 
@@ -459,6 +497,12 @@ def show_unit(scene: bpy.types.Scene, sample: int) -> None:
     overlay.figure = overlay.UnitFigure(title, tuple(pictures), uid, scene.name, lines)  # type: ignore[arg-type]
     look.unit_sample = sample
     viewport.redraw()
+
+
+def _follow_unit(scene: bpy.types.Scene) -> None:
+    """The figure, if one is shown, becomes that of the chosen row and place."""
+    if overlay.figure is not None and overlay.figure.scene == scene.name:
+        show_unit(scene, look_of(scene).unit_sample)
 
 
 def step_unit(scene: bpy.types.Scene, step: int) -> None:
@@ -510,10 +554,20 @@ def clear() -> int:
     """Removes all of it from the file and gives the views their settings back; how many data-blocks there were."""
     overlay.figure = None
     _painted_fields.clear()
+    for scene in bpy.data.scenes:
+        look_of(scene).focused = False
     count = pointcloud.clear()
     viewport.restore_colors()
     viewport.redraw()
     return count
+
+
+def settle_colors() -> None:
+    """After undo and redo, which leave the views' settings as they are: these follow what is shown now."""
+    if not pointcloud.anything_colored():
+        viewport.restore_colors()
+    elif not viewport.colors_changed():  # else they are what they were, but for what the user has chosen since
+        viewport.show_colors()
 
 
 def anything() -> bool:

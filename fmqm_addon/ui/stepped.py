@@ -94,10 +94,11 @@ class SteppedOperator:
         self._job.stop()
 
     def _slice(self) -> bool:
-        """Some milliseconds of work; whether there is more."""
-        began = time.perf_counter()
+        """Some milliseconds of work; whether there is more. Ends where something else begins: it may be one long step,
+        and should be announced before."""
+        began, stage = time.perf_counter(), self.stepper.progress.stage
         more = True
-        while more and time.perf_counter() - began < SLICE:
+        while more and time.perf_counter() - began < SLICE and self.stepper.progress.stage == stage:
             more = self.stepper.step()
         session.longest_tick = max(session.longest_tick, time.perf_counter() - began)
         return more

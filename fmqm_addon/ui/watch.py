@@ -7,15 +7,16 @@ There is nobody to see marks without a window, and a handler left in bpy 4.5 kee
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 
 import bpy
 from bpy.app.handlers import persistent
 
-from ..blender.job import pair_fingerprint
-from ..blender.snapshot import Target
-from . import session
-from .properties import FMQMRow
+from ..blender.snapshot import Target, fingerprint, in_edit_mode
+from ..blender.space import place_counts
+from . import session, show
+from .properties import FMQMRow, item_target, kept
 
 _WATCHED = (bpy.types.Object, bpy.types.Mesh, bpy.types.Material, bpy.types.NodeTree, bpy.types.Image)
 _DELAY = 0.7  # seconds without a change before the rows are looked at
@@ -30,13 +31,14 @@ def row_targets(row: FMQMRow) -> tuple[Target, Target]:
 
 
 def check(scene: bpy.types.Scene) -> None:
-    """Brings session.stale up to date for the rows of a scene."""
+    """Brings session.stale up to date for the rows of a scene, but for those of which something is being edited."""
+    mark = functools.cache(fingerprint)  # the reference is mostly the same
     for row in scene.fmqm.rows:
-        if row.error:
-            continue
         reference, target = row_targets(row)
+        if row.error or in_edit_mode(reference) or in_edit_mode(target):
+            continue
         was = row.fingerprint.partition(" ")[::2]
-        now = pair_fingerprint(reference, target, row.space)
+        now = [mark(asset, place_counts(row.space)) for asset in (reference, target)]
         parts = []
         for asset, before, after in ((reference, was[0], now[0]), (target, was[1], now[1])):
             if not after:
@@ -44,9 +46,19 @@ def check(scene: bpy.types.Scene) -> None:
             elif before != after:
                 parts.append(f"{asset.name} has changed")
         if parts:
-            session.stale[row.uid] = " and ".join(dict.fromkeys(parts))
+            text = " and ".join(dict.fromkeys(parts))
+            session.stale[row.uid] = text if "" in now else f"{text} since; measure again"
         else:
             session.stale.pop(row.uid, None)
+
+
+def forget_deleted(scene: bpy.types.Scene) -> None:
+    """Lets go of compared objects that were deleted: as long as a property points at them they would be saved."""
+    for item in scene.fmqm.compared:
+        if item.object is not None and item_target(item) is None:
+            item.name, item.object = item.object.name, None
+    if scene.fmqm.reference is not None and kept(scene.fmqm.reference) is None:
+        scene.fmqm.reference = None
 
 
 def redraw() -> None:
@@ -94,6 +106,7 @@ def _on_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 @_kept
 def _on_undo(*_: object) -> None:
     soon()
+    bpy.app.timers.register(show.settle_colors, first_interval=0)
 
 
 @_kept
@@ -107,6 +120,12 @@ def _after_load(*_: object) -> None:
     soon()
 
 
+@_kept
+def _before_save(*_: object) -> None:
+    for scene in bpy.data.scenes:
+        forget_deleted(scene)
+
+
 def _stop_job() -> None:
     if session.job is not None:
         session.job.stop()
@@ -118,6 +137,7 @@ _HANDLERS = (
     ("redo_post", _on_undo),
     ("load_pre", _before_load),
     ("load_post", _after_load),
+    ("save_pre", _before_save),
 )
 
 

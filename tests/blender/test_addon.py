@@ -16,11 +16,14 @@ import pytest
 
 import fmqm_addon
 from fmqm_addon import api, ui
+from fmqm_addon.blender import job
+from fmqm_addon.blender.snapshot import target_of
 from fmqm_addon.metric.errors import SettingsError
-from fmqm_addon.metric.score import COLUMNS
+from fmqm_addon.metric.score import COLUMNS, Progress, Stepper, Work
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.ui import inputs, measuring, panels, results, session, watch
-from fmqm_addon.ui.properties import metric_settings, row_scores
+from fmqm_addon.ui.properties import item_target, metric_settings, row_scores
+from fmqm_addon.ui.stepped import SteppedOperator
 
 from . import scenes
 from .script import read_json, score
@@ -275,16 +278,13 @@ def test_an_error_is_one_rows(fmqm: ui.scene.FMQMScene, lods: list[bpy.types.Obj
     flat = scenes.cube("No Image", materials=[no_image])
     hollow = bpy.data.objects.new("Hollow", None)
     bpy.context.scene.collection.objects.link(hollow)
-    gone = scenes.cube("Gone")
-    compare(lods[0], bare, flat, hollow, gone, lods[1])
-    bpy.context.scene.collection.objects.unlink(gone)
+    compare(lods[0], bare, flat, hollow, lods[1])
     assert bpy.ops.fmqm.measure() == {"FINISHED"}
     errors = {row.name: row.error for row in fmqm.rows}
     assert "no faces" in errors["Bare"]
     assert "holds no image" in errors["No Image"]
     assert "no mesh in it" in errors["Hollow"]
-    assert "deleted" in errors["Gone"]
-    assert not errors["Rock_LOD1"] and numbers(fmqm.rows[4])
+    assert not errors["Rock_LOD1"] and numbers(fmqm.rows[3])
     assert row_scores(fmqm.rows[0]) is None
     bpy.ops.fmqm.sort_rows(column="FMQM")
     assert fmqm.rows[0].name == "Rock_LOD1"
@@ -347,6 +347,147 @@ def test_rows_that_are_out_of_date(
     assert {row.name for row in fmqm.rows if row.uid in session.stale} == (stale or set())
 
 
+def stale_names(fmqm: ui.scene.FMQMScene) -> set[str]:
+    bpy.context.view_layer.update()
+    watch.check(bpy.context.scene)
+    return {row.name for row in fmqm.rows if row.uid in session.stale}
+
+
+def test_painting_marks_and_saving_the_image_does_not_take_the_mark_away(
+    fmqm: ui.scene.FMQMScene, lods: list[bpy.types.Object], tmp_path: Path
+) -> None:
+    own = scenes.write_png(tmp_path / "own.png", scenes.noise(32))
+    lods[1].data.materials[0] = scenes.textured(own, "Own")
+    image = bpy.data.images["own.png"]
+    compare(lods[0], lods[1])
+    bpy.ops.fmqm.measure()
+    values = np.full(len(image.pixels), 0.5, np.float32)
+    image.pixels.foreach_set(values)
+    assert image.is_dirty and stale_names(fmqm) == {"Rock_LOD1"}
+    bpy.ops.fmqm.measure()
+    assert not stale_names(fmqm)
+    image.pixels[0] = 0.7
+    assert stale_names(fmqm) == {"Rock_LOD1"}, "painted further"
+    bpy.ops.fmqm.measure()
+    image.save()
+    assert not image.is_dirty
+    bpy.ops.fmqm.measure()
+    assert not stale_names(fmqm)
+    image.pixels.foreach_set(values)
+    image.save()
+    assert not image.is_dirty and stale_names(fmqm) == {"Rock_LOD1"}
+
+
+def test_vertex_colors_mark(fmqm: ui.scene.FMQMScene, lods: list[bpy.types.Object]) -> None:
+    mesh = lods[1].data
+    mesh.materials.clear()
+    colors = mesh.color_attributes.new("Col", "FLOAT_COLOR", "POINT")
+    compare(lods[0], *lods[1:])
+    bpy.ops.fmqm.measure()
+    assert not stale_names(fmqm)
+    colors.data.foreach_set("color", [0.0, 1.0, 0.0, 1.0] * len(mesh.vertices))
+    assert stale_names(fmqm) == {"Rock_LOD1"}
+
+
+def test_a_pose_marks_and_moving_all_together_does_not(fmqm: ui.scene.FMQMScene, lods: list[bpy.types.Object]) -> None:
+    rig = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
+    bpy.context.scene.collection.objects.link(rig)
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    rig.data.edit_bones.new("Bone").tail = (0, 0, 1)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    lods[1].vertex_groups.new(name="Bone").add(range(len(lods[1].data.vertices)), 1.0, "REPLACE")
+    lods[1].modifiers.new("Armature", "ARMATURE").object = rig
+    fmqm.settings.space = "LOCAL"
+    compare(lods[0], *lods[1:])
+    bpy.ops.fmqm.measure()
+    for moved in (rig, lods[1]):
+        moved.location.y += 0.73
+    assert not stale_names(fmqm)
+    rig.pose.bones["Bone"].rotation_quaternion = (0.9, 0.3, 0, 0)
+    assert stale_names(fmqm) == {"Rock_LOD1"}
+    bpy.ops.fmqm.measure()
+    rig.location.x += 0.2
+    assert stale_names(fmqm) == {"Rock_LOD1"}, "its place to the object"
+
+
+def test_saving_the_file_and_edit_mode_change_nothing(
+    fmqm: ui.scene.FMQMScene, lods: list[bpy.types.Object], tmp_path: Path
+) -> None:
+    lods[2].data.color_attributes.new("Col", "BYTE_COLOR", "CORNER")
+    compare(lods[0], *lods[1:])
+    bpy.ops.fmqm.measure()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "saved.blend"))
+    fmqm = bpy.context.scene.fmqm
+    assert bpy.data.images["noise.png"].filepath.startswith("//") and not stale_names(fmqm)
+    select(*(bpy.data.objects[f"Rock_LOD{level}"] for level in (2, 1, 0)))
+    bpy.ops.object.mode_set(mode="EDIT")
+    before = scenes.blocks()
+    assert not stale_names(fmqm)
+    bpy.ops.fmqm.measure()
+    assert scenes.blocks() == before
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert not stale_names(fmqm), "measured in edit mode, and nothing changed there"
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.transform.translate(value=(0, 0, 1))
+    assert not stale_names(fmqm), "it may still be undone"
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert stale_names(fmqm) == {"Rock_LOD1", "Rock_LOD2"}
+
+
+def test_deleted_objects_are_gone_and_let_go_of(fmqm: ui.scene.FMQMScene, lods: list[bpy.types.Object]) -> None:
+    compare(lods[0], *lods[1:])
+    bpy.ops.fmqm.measure()
+    before = numbers(fmqm.rows[1])
+    select(lods[2])
+    bpy.ops.object.delete()
+    assert fmqm.compared[1].object is not None, "Blender keeps what a property points at"
+    assert item_target(fmqm.compared[1]) is None and item_target(fmqm.compared[0]) == lods[1]
+    bpy.ops.fmqm.measure()
+    assert [row.error for row in fmqm.rows] == ["", ""] and numbers(fmqm.rows[1]) == before
+    assert stale_names(fmqm) == {"Rock_LOD2"}
+    select(lods[1])
+    bpy.ops.object.delete()
+    assert why_not().endswith("Add an object to compare with the reference")
+    select(lods[0])
+    bpy.ops.object.delete()
+    assert why_not().endswith("Rock_LOD0 is gone; choose another reference")
+    watch.forget_deleted(bpy.context.scene)
+    assert fmqm.reference is None and [item.object for item in fmqm.compared] == [None, None]
+    assert [item.name for item in fmqm.compared] == ["Rock_LOD1", "Rock_LOD2"]
+    assert not any(object_.users for object_ in bpy.data.objects if object_.name.startswith("Rock"))
+
+
+def test_scores_stay_where_an_object_is_deleted_while_it_is_measured(
+    fmqm: ui.scene.FMQMScene, lods: list[bpy.types.Object]
+) -> None:
+    compare(lods[0], *lods[1:])
+    bpy.ops.fmqm.measure()
+    before = [row.scores for row in fmqm.rows]
+    error = job.Outcome(target_of(lods[0]), target_of(lods[2]), error="why")
+    bpy.data.objects.remove(lods[2])
+    measuring._write_row(fmqm, error, "{}")
+    assert [row.scores for row in fmqm.rows] == before and not fmqm.rows[1].error
+
+
+def test_a_slice_of_work_ends_before_something_else_begins() -> None:
+    """So that what is announced is on the screen while a long step is at work."""
+    begun: list[str] = []
+
+    def work() -> Work[None]:
+        for stage in ("Reading", "Reading: baking", "Preparing"):
+            yield Progress(stage, 0.0)
+            begun.append(stage)
+
+    operator = SteppedOperator()
+    operator.stepper = Stepper(work())
+    seen = []
+    while operator._slice():
+        seen.append((operator.stepper.progress.stage, len(begun)))
+    assert seen == [("Reading", 0), ("Reading: baking", 1), ("Preparing", 2)]
+
+
 def test_sorting_keeps_the_choice(fmqm: ui.scene.FMQMScene, lods: list[bpy.types.Object]) -> None:
     compare(lods[0], *lods[1:])
     bpy.ops.fmqm.measure()
@@ -376,6 +517,8 @@ def test_saving(fmqm: ui.scene.FMQMScene, lods: list[bpy.types.Object], tmp_path
     assert (tmp_path / "out.csv").read_text().count("\n") == 3
     with np.load(tmp_path / "out.npz") as fields:
         assert fields["patch_scores"].mean(axis=0).tolist() == pytest.approx(numbers(fmqm.rows[0]))
+    with pytest.raises(RuntimeError, match="No file is named"):
+        bpy.ops.fmqm.save_results()
     with pytest.raises(RuntimeError, match="does not exist"):
         bpy.ops.fmqm.save_results(filepath=str(tmp_path / "no" / "out.json"))
     fmqm.settings.seed = 7  # other settings: another file
@@ -386,6 +529,19 @@ def test_saving(fmqm: ui.scene.FMQMScene, lods: list[bpy.types.Object], tmp_path
     session.clear()
     with pytest.raises(RuntimeError, match="measure again"):
         bpy.ops.fmqm.save_results(filepath=str(tmp_path / "out.npz"), file_format="npz")
+
+
+def test_rows_at_other_settings_are_told_apart(fmqm: ui.scene.FMQMScene, lods: list[bpy.types.Object]) -> None:
+    rows = []
+    for lod, preset, seed in ((lods[1], "FAST", 0), (lods[2], "FAST", 3), (lods[0], "CUSTOM", 3)):
+        fmqm.settings.preset, fmqm.settings.seed = preset, seed
+        if preset == "CUSTOM":
+            fmqm.settings.samples = QUICK.samples
+        outcome = job.Outcome(target_of(lods[0]), target_of(lod))
+        measuring._write_row(fmqm, outcome, json.dumps(metric_settings(fmqm.settings).as_dict()))
+        rows.append(fmqm.rows[len(rows)])
+    assert [results.settings_name(row) for row in rows] == ["Fast", "Fast", "Custom"]
+    assert results.comparable(rows[0], rows[1]) and not results.comparable(rows[1], rows[2])
 
 
 def test_presets() -> None:

@@ -418,10 +418,16 @@ def test_button_makes_a_copy_with_a_live_modifier() -> None:
     copy = bpy.context.active_object
     assert copy.name == "Rock FMQM 0.90" and copy.data == monkey.data and copy.matrix_world == monkey.matrix_world
     assert 0 < copy.modifiers[DECIMATE].ratio < 1 and not monkey.modifiers
-    assert "triangles: about 0." in fmqm.decimate.path
+    assert monkey.hide_get() and not copy.hide_get(), "they would flicker"
+    assert "triangles: about 0." in fmqm.decimate.path and fmqm.decimate.path_of == "Rock"
+    chosen = fmqm.decimate.path.splitlines()[fmqm.decimate.found]
+    triangles, score = chosen.split(" triangles: ")
+    assert int(triangles) == len(scene_reader([copy.name], "copy")(Version()).triangles) and float(score) >= 0.9
     fmqm.decimate.limited, fmqm.decimate.max_triangles = True, 20
     before = scenes.blocks()
     assert bpy.ops.fmqm.decimate() == {"CANCELLED"} and scenes.blocks() == before, "missed: nothing is made"
+    assert fmqm.decimate.path_of == "Rock FMQM 0.90" and fmqm.decimate.found == -1, "its path is told all the same"
+    assert all(int(line.split()[0]) <= 20 for line in fmqm.decimate.path.splitlines())
 
 
 def during_the_search(monkeypatch: pytest.MonkeyPatch, change: Callable[[], object]) -> None:

@@ -7,13 +7,14 @@ import dataclasses
 import json
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 
 import fmqm_addon
-from fmqm_addon.blender import pointcloud
+from fmqm_addon.blender import pointcloud, viewport
 from fmqm_addon.blender.measure import Comparison, Measurement
 from fmqm_addon.blender.mesh import mesh_arrays
 from fmqm_addon.metric.color import decode_srgb, srgb_to_lab
@@ -68,12 +69,12 @@ def by_hand() -> tuple[Fields, Fields]:
 
 
 def legend() -> dict:
-    return json.loads(pointcloud.find_object(pointcloud.CLOUD)[overlay.LEGEND])
+    return json.loads(pointcloud.find_object(bpy.context.scene, pointcloud.CLOUD)[overlay.LEGEND])
 
 
 def point_colors(kind: str = pointcloud.CLOUD) -> np.ndarray:
     """(N, 3) linear, of the first corner of each point."""
-    mesh = pointcloud.find_object(kind).data
+    mesh = pointcloud.find_object(bpy.context.scene, kind).data
     values = np.empty(4 * len(mesh.vertices), np.float32)
     mesh.attributes[pointcloud.COLOR].data.foreach_get("color", values)
     return values.reshape(-1, 4)[:: 4 if kind == pointcloud.CLOUD else 1, :3]
@@ -208,7 +209,7 @@ def test_slice_points_are_the_centers_of_pixels() -> None:
 
 def test_cloud_is_at_the_reference_or_the_compared(scene: bpy.types.Scene, measured: session.Measured) -> None:
     bpy.ops.fmqm.look()
-    cloud = pointcloud.find_object(pointcloud.CLOUD)
+    cloud = pointcloud.find_object(bpy.context.scene, pointcloud.CLOUD)
     result = measured.comparison.result
     world = result.frame.leave(result.samples.positions)
 
@@ -287,7 +288,7 @@ def test_worst_places_show_only_their_patch(scene: bpy.types.Scene, measured: se
     look, result = scene.fmqm.look, measured.comparison.result
 
     def shown() -> set[int]:
-        mesh = pointcloud.find_object(pointcloud.CLOUD).data
+        mesh = pointcloud.find_object(bpy.context.scene, pointcloud.CLOUD).data
         values = np.empty(3 * len(mesh.vertices), np.float32)
         mesh.vertices.foreach_get("co", values)
         corners = values.reshape(-1, 4, 3)
@@ -312,7 +313,7 @@ def test_slice_shows_the_field_where_it_is(scene: bpy.types.Scene, measured: ses
     look = scene.fmqm.look
     look.slice_layer, look.slice_resolution = "NCF_REFERENCE", "128"
     bpy.ops.fmqm.slice()
-    plane = pointcloud.find_object(pointcloud.SLICE)
+    plane = pointcloud.find_object(bpy.context.scene, pointcloud.SLICE)
 
     def pixels() -> np.ndarray:
         values = np.empty(128 * 128 * 4, np.float32)
@@ -326,9 +327,9 @@ def test_slice_shows_the_field_where_it_is(scene: bpy.types.Scene, measured: ses
     first = pixels()
     plane.location.z += 0.5
     bpy.context.view_layer.update()
-    assert show.slice_has_moved()
+    assert show.slice_has_moved(scene)
     show.draw_slice(scene)
-    assert not show.slice_has_moved() and (pixels() != first).any()
+    assert not show.slice_has_moved(scene) and (pixels() != first).any()
 
 
 def test_cloud_follows_the_chosen_row(scene: bpy.types.Scene, measured: session.Measured) -> None:
@@ -340,6 +341,185 @@ def test_cloud_follows_the_chosen_row(scene: bpy.types.Scene, measured: session.
     scene.fmqm.row_index = 1
     scene.fmqm.look.layer = "PATCH"
     assert len(point_colors()) == 50 and len(scenes.blocks()) == before
+
+
+def subtitle(kind: str) -> str:
+    return str(json.loads(pointcloud.find_object(bpy.context.scene, kind)[overlay.LEGEND])["subtitle"])
+
+
+def add_row(scene: bpy.types.Scene, measured: session.Measured, name: str) -> None:
+    """A second result, of a compared object of this name."""
+    row = scene.fmqm.rows.add()
+    row.uid, row.name = name, name
+    comparison = dataclasses.replace(
+        measured.comparison, distorted=dataclasses.replace(measured.comparison.distorted, name=name)
+    )
+    session.put(name, dataclasses.replace(measured, comparison=comparison))
+
+
+SHOWN = (pointcloud.CLOUD, pointcloud.PAINTED, pointcloud.SHELLS, pointcloud.SLICE)
+
+
+def show_all() -> None:
+    for act in (bpy.ops.fmqm.look, bpy.ops.fmqm.paint_surface, bpy.ops.fmqm.shells, bpy.ops.fmqm.slice):
+        act()
+
+
+def test_all_follows_the_chosen_row(scene: bpy.types.Scene, measured: session.Measured) -> None:
+    scene.fmqm.look.shell_field = "COMPARED"
+    show_all()
+    bpy.ops.fmqm.unit_step()
+    add_row(scene, measured, "Other")
+    scene.fmqm.row_index = 1
+    legends = [pointcloud.find_object(scene, kind)[overlay.LEGEND] for kind in SHOWN]
+    assert all("Other" in text and "Monkey_LOD1" not in text for text in legends)
+    assert overlay.figure is not None and overlay.figure.uid == "Other"
+    scene.fmqm.rows.add().error = "broken"
+    scene.fmqm.row_index = 2  # nothing to follow
+    assert legends == [pointcloud.find_object(scene, kind)[overlay.LEGEND] for kind in SHOWN]
+
+
+def test_all_but_the_slice_follows_the_place(scene: bpy.types.Scene) -> None:
+    show_all()
+    bpy.ops.fmqm.unit_step()
+    lines = overlay.figure.lines
+
+    def places() -> np.ndarray:
+        return np.array([pointcloud.find_object(scene, kind).location.x for kind in SHOWN])
+
+    before = places()
+    scene.fmqm.look.place = "COMPARED"
+    assert places() - before == pytest.approx([10, 10, 10, 0], abs=1e-5)
+    assert overlay.figure.lines == pytest.approx(lines + (10, 0, 0))
+
+
+def test_worst_places_are_the_chosen_rows(scene: bpy.types.Scene, measured: session.Measured) -> None:
+    look = scene.fmqm.look
+    bpy.ops.fmqm.look()
+    bpy.ops.fmqm.clear()
+    add_row(scene, measured, "Other")
+    scene.fmqm.rows.add().error = "broken"
+    scene.fmqm.row_index = 1
+    assert look.worst_uid == "Other" and len(look.worst) == FEW.patches
+    look.worst_index = 3  # a click in the list
+    assert look.worst_index == 3 and look.focused
+    scene.fmqm.row_index = 2
+    assert not len(look.worst)
+    bpy.ops.fmqm.worst_all()  # still there for the points that are shown
+    assert not look.focused
+
+
+def test_each_scene_shows_its_own(scene: bpy.types.Scene, measured: session.Measured) -> None:
+    show_all()
+    mine = [pointcloud.find_object(scene, kind) for kind in SHOWN]
+    two = bpy.data.scenes.new("Two")
+    add_row(two, measured, "Other")
+    show.show_cloud(two)
+    show.show_slice(two)
+    assert [pointcloud.find_object(scene, kind) for kind in SHOWN] == mine and subtitle(SHOWN[0]) == "Monkey_LOD1"
+    theirs = list(pointcloud.objects(two))
+    assert len(theirs) == 2 and not set(theirs) & set(mine)
+    assert all(len(shown.users_scene) == 1 for shown in (*mine, *theirs))
+    bpy.ops.fmqm.clear()
+    assert not pointcloud.anything()
+
+
+def test_what_was_hidden_is_shown_when_asked_for(scene: bpy.types.Scene) -> None:
+    bpy.ops.fmqm.look()
+    cloud = pointcloud.find_object(scene, pointcloud.CLOUD)
+    (collection,) = cloud.users_collection
+
+    def layer() -> bpy.types.LayerCollection:
+        return bpy.context.view_layer.layer_collection.children[collection.name]
+
+    def hide_collection() -> None:
+        collection.hide_viewport = True
+
+    def hide_in_layer() -> None:
+        layer().hide_viewport = True
+
+    def leave_out() -> None:
+        layer().exclude = True
+
+    def disable() -> None:
+        cloud.hide_viewport = True
+
+    for hide in (lambda: cloud.hide_set(True), disable, hide_collection, hide_in_layer, leave_out):
+        hide()
+        assert not cloud.visible_get()
+        scene.fmqm.row_index = 0  # following is not asking
+        assert not cloud.visible_get()
+        bpy.ops.fmqm.look()
+        assert cloud.visible_get(), hide
+    cloud.hide_set(True)
+    bpy.ops.fmqm.worst_step()
+    assert cloud.visible_get()
+
+
+def test_slice_is_in_the_saved_file(scene: bpy.types.Scene, tmp_path: Path) -> None:
+    bpy.ops.fmqm.slice()
+
+    def pixels() -> list[float]:
+        return list(pointcloud.find_object(bpy.context.scene, pointcloud.SLICE).data.pixels)
+
+    for height in (0.0, 0.3):  # a picture that was packed can be drawn again
+        pointcloud.find_object(scene, pointcloud.SLICE).location.z = height
+        bpy.context.view_layer.update()
+        show.draw_slice(scene)
+        before = pixels()
+        path = str(tmp_path / f"{height}.blend")
+        bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
+        with bpy.data.libraries.load(path) as (_, into):
+            into.images = ["FMQM Slice"]
+        assert list(into.images[0].pixels) == before and len(set(before)) > 3
+        bpy.data.images.remove(into.images[0])
+
+
+def test_lengths_of_the_shells_have_the_scenes_unit(scene: bpy.types.Scene) -> None:
+    bpy.ops.fmqm.shells()
+    assert subtitle(pointcloud.SHELLS).endswith(" cm apart")
+    scene.unit_settings.system = "NONE"
+    bpy.ops.fmqm.shells()
+    assert float(subtitle(pointcloud.SHELLS).removesuffix(" apart")) > 0
+
+
+def test_undo_takes_the_views_colors_along(scene: bpy.types.Scene) -> None:
+    """Undo and redo change the file but not the views; the window calls this after them."""
+    view = next(s for screen in bpy.data.screens for a in screen.areas for s in a.spaces if s.type == "VIEW_3D")
+    before = view.shading.color_type
+    bpy.ops.fmqm.slice()
+    show.settle_colors()
+    assert view.shading.color_type == before  # a slice needs no other colors
+    bpy.ops.fmqm.look()
+    view.shading.color_type = "RANDOM"
+    show.settle_colors()
+    assert view.shading.color_type == "RANDOM"  # the user's choice
+    view.shading.color_type = "VERTEX"
+    pointcloud.clear()  # as undo would
+    show.settle_colors()
+    assert view.shading.color_type == before and not viewport.colors_changed()
+    show.show_cloud(scene)
+    viewport.restore_colors()
+    show.settle_colors()  # after redo
+    assert view.shading.color_type == "VERTEX"
+
+
+def test_figure_goes_with_its_row(scene: bpy.types.Scene) -> None:
+    bpy.ops.fmqm.unit_step()
+    assert overlay.figure is not None and overlay.belongs_here(overlay.figure)
+    scene.fmqm.rows.clear()  # as undo past the measurement would, which leaves the session alone
+    assert session.get("row") is not None and not overlay.belongs_here(overlay.figure)
+
+
+def test_switched_off_it_leaves_nothing(scene: bpy.types.Scene) -> None:
+    show_all()
+    bpy.ops.fmqm.worst_step()
+    fmqm_addon.unregister()
+    try:
+        assert not pointcloud.anything() and not viewport.colors_changed() and overlay.figure is None
+    finally:
+        fmqm_addon.register()
+    assert not bpy.context.scene.fmqm.look.focused
 
 
 def test_without_samples_it_says_measure_again(scene: bpy.types.Scene) -> None:

@@ -103,19 +103,43 @@ def test_floating_junk_is_a_warning_and_the_other_direction_sees_it(pair: list[b
 
 
 class Layout:
-    """Writes down what a panel says, in the place of Blender's own."""
+    """Writes down what a panel says, line by line, in the place of Blender's own."""
 
-    def __init__(self) -> None:
-        self.said: list[str] = []
+    def __init__(self, said: list[str] | None = None) -> None:
+        self.said = [] if said is None else said
+        self.line: list[str] | None = None
 
-    def column(self, align: bool) -> Layout:
-        return self
+    def column(self, align: bool = False) -> Layout:
+        return Layout(self.said)
 
-    def split(self, factor: float, align: bool) -> Layout:
-        return self
+    def row(self, align: bool = False) -> Layout:
+        """A row's part belongs to its line."""
+        made = Layout(self.said)
+        made.line = [] if self.line is None else self.line
+        return made
 
-    def label(self, text: str, translate: bool = True) -> None:
+    def separator(self, factor: float) -> None:
+        pass
+
+    def label(self, text: str, translate: bool = True, icon: str = "NONE") -> None:
+        if self.line:
+            self.said.pop()
+        if self.line is not None:
+            self.line.append(text)
+            text = ": ".join(self.line)
         self.said.append(text)
+
+
+def said_at(width: int) -> list[str]:
+    """What the panel says of the chosen row in a sidebar of so many pixels."""
+    context = SimpleNamespace(
+        scene=bpy.context.scene,
+        region=SimpleNamespace(width=width),
+        preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)),
+    )
+    layout = Layout()
+    panels.FMQM_PT_trust.draw(SimpleNamespace(layout=layout), context)
+    return layout.said
 
 
 def test_rows_keep_the_report_and_the_other_direction(pair: list[bpy.types.Object]) -> None:
@@ -134,11 +158,19 @@ def test_rows_keep_the_report_and_the_other_direction(pair: list[bpy.types.Objec
         assert row_trust(row) == json.loads(json.dumps(trust_dict(outcome.trust)))
         assert row_reverse(row) == dict(zip(COLUMNS, outcome.reverse, strict=True))
         kept = pair_of(row)
-        layout = Layout()
-        panels.FMQM_PT_trust.draw(SimpleNamespace(layout=layout), bpy.context)
-        said = dict(zip(layout.said[::2], layout.said[1::2], strict=True))
-        assert said["Watertight"] == "no" and said["Triangles"] == "968 / 980" and said["Flipped"] == "0 %"
-        assert said["Base color, distorted"].endswith(", 32 x 32, sRGB")
         assert kept.trust == row_trust(row) and np.array_equal(kept.reverse, outcome.reverse)
+        wide, narrow = said_at(800), said_at(230)
+        assert {"Watertight: no", "Triangles: 968 / 980", "Flipped: 0 % of samples"} <= set(wide)
+        assert any(said.startswith("Non-manifold edges") for said in wide)
+        assert any(said.startswith("Base color, compared: ") and said.endswith("32, sRGB") for said in wide)
+        assert not any("distorted" in said or "Baked at" in said for said in wide), "called Compared; nothing was baked"
+        place = narrow.index("UV missing: 0 %")
+        assert narrow[place + 1] == "of the textured area" and max(map(len, narrow)) <= 30
+        report = trust_dict(outcome.trust)
+        report["reference"]["uv_missing"] |= {"value": None, "why": "no one looked"}
+        report["distorted"]["colors_from"]["value"] = {"Rust": "baked"}
+        row.trust = json.dumps(report)
+        assert any(said.startswith("Baked at: 1,024 pixels a side") for said in said_at(800))
+        assert said_at(230)[place : place + 2] == ["UV missing: ? / 0 %", "no one looked; of the"]
     finally:
         fmqm_addon.unregister()
