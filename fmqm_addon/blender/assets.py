@@ -13,6 +13,9 @@ from ..metric.errors import MeshError
 SURFACE_TYPES = ("MESH", "CURVE", "SURFACE", "FONT", "META")  # objects that Blender shows as meshes
 WANTED = "a mesh, curve, surface, text, metaball or empty is wanted"
 
+_MOST_INSTANCES = 1_000_000  # objects; more take minutes, in which nothing can stop Blender
+_DEEPEST = 8  # collections in one another that Blender shows
+
 _NUMBER = re.compile(r"(.*)\.(\d+)", re.DOTALL)
 _NOT_EXPORTED = "glTF_not_exported"  # where the glTF importer puts what it made for display
 
@@ -44,6 +47,26 @@ def check_object(object_: bpy.types.Object) -> None:
 def instanced(object_: bpy.types.Object) -> bpy.types.Collection | None:
     """The collection that an object shows in its place."""
     return object_.instance_collection if object_.instance_type == "COLLECTION" else None
+
+
+def check_instances(objects: Iterable[bpy.types.Object]) -> None:
+    """Counts what objects instance without unfolding it: collections that instance each other multiply.
+
+    Raises:
+        MeshError: it is too much.
+    """
+    roots = [instanced(object_) for object_ in objects]
+    if not any(roots):
+        return
+    held = {each: [instanced(object_) for object_ in each.all_objects] for each in bpy.data.collections}
+    shown = {None: 0} | dict.fromkeys(held, 0)
+    for _ in range(_DEEPEST):
+        shown |= {each: sum(1 + shown[inner] for inner in nested) for each, nested in held.items()}
+    count = sum(shown[root] for root in roots)
+    if count > _MOST_INSTANCES:
+        raise MeshError(
+            f"its collections show {count:,} objects by instancing each other; at most {_MOST_INSTANCES:,} are measured"
+        )
 
 
 def collection_members(collection: bpy.types.Collection) -> list[bpy.types.Object]:

@@ -10,6 +10,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from idprop.types import IDPropertyArray
 from numpy.typing import NDArray
 
 from ..metric.color import ImageAlpha, Material, Opacity, Texture, encode_srgb
@@ -102,7 +103,7 @@ def _bake(
     size: int,
     temporary: ExitStack,
 ) -> dict[int, Baked]:
-    scene = _scene(depsgraph.scene, temporary)
+    scene = _scene(depsgraph, temporary)
     source = bpy.data.meshes.new_from_object(object_, preserve_all_data_layers=True, depsgraph=depsgraph)
     temporary.callback(bpy.data.meshes.remove, source)
     vertices = np.nan_to_num(_values(source.attributes["position"]).astype(np.float64), posinf=0, neginf=0)
@@ -121,10 +122,11 @@ def _bake(
     mesh, uv_map = _triangles(source, parts, temporary)
     stand_in = _stand_in(object_, mesh, temporary)
     scene.collection.objects.link(stand_in)
+    numbers = _numbers(mesh)
 
     def draw(shine: Shine) -> list[NDArray[np.float32]]:
         for index, part in enumerate(parts):
-            material = shining(slots[part.slot][0].original, shine, temporary)
+            material = shining(slots[part.slot][0].original, shine, numbers, temporary)
             target = material.node_tree.nodes.new("ShaderNodeTexImage")
             target.image = part.image
             material.node_tree.nodes.active = target
@@ -141,7 +143,7 @@ def _bake(
     }
 
 
-def _scene(like: bpy.types.Scene, temporary: ExitStack) -> bpy.types.Scene:
+def _scene(depsgraph: bpy.types.Depsgraph, temporary: ExitStack) -> bpy.types.Scene:
     scene = bpy.data.scenes.new("FMQM bake")
     temporary.callback(bpy.data.scenes.remove, scene)
     try:
@@ -149,10 +151,13 @@ def _scene(like: bpy.types.Scene, temporary: ExitStack) -> bpy.types.Scene:
     except TypeError as error:
         raise MeshError("this Blender has no Cycles") from error
     # For image sequences; other animated values are copied as they are.
+    like = depsgraph.scene
     scene.frame_current, scene.frame_subframe = like.frame_current, like.frame_subframe
     # The one sample of a pixel lies in its middle.
     scene.cycles.device, scene.cycles.samples, scene.cycles.max_bounces = "CPU", 1, 0
     scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False
+    copy_properties(like, scene)
+    copy_properties(depsgraph.view_layer, scene.view_layers[0])
     return scene
 
 
@@ -165,10 +170,20 @@ def _stand_in(object_: bpy.types.Object, mesh: bpy.types.Mesh, temporary: ExitSt
     temporary.callback(bpy.data.objects.remove, made.parent)
     made.matrix_parent_inverse = object_.matrix_world
     made.color, made.pass_index = object_.color, object_.pass_index
+    copy_properties(object_, made)
+    copy_properties(object_.original.data, mesh)  # which modifiers may lose on their way
+    copy_properties(object_.data, mesh)
     modeled = object_.original.data
     if isinstance(modeled, bpy.types.Mesh) and len(modeled.vertices) == len(mesh.vertices):
         _bend(made, _read(modeled.vertices, "co", 3, np.float32), temporary)
     return made
+
+
+def copy_properties(source: Any, target: Any) -> None:
+    """Custom properties that Attribute nodes can read: numbers, and arrays of them."""
+    for name, value in source.items():
+        if isinstance(value, int | float | IDPropertyArray):
+            target[name] = value
 
 
 def _run(scene: bpy.types.Scene, object_: bpy.types.Object, uv_map: str) -> None:
@@ -274,7 +289,8 @@ def _triangles(source: bpy.types.Mesh, parts: list[_Part], temporary: ExitStack)
     _store(mesh, "material_index", "INT", "FACE", np.repeat(np.arange(len(parts)), [len(part.rows) for part in parts]))
     for layer in source.uv_layers:
         mesh.uv_layers[layer.name].active_render = layer.active_render
-    mesh.attributes.default_color_name = source.attributes.default_color_name
+    if source.attributes.default_color_name not in _numbers(mesh):
+        mesh.attributes.default_color_name = source.attributes.default_color_name
     mesh.use_auto_texspace = False
     mesh.texspace_location, mesh.texspace_size = source.texspace_location, source.texspace_size
     for _ in parts:
@@ -282,8 +298,15 @@ def _triangles(source: bpy.types.Mesh, parts: list[_Part], temporary: ExitStack)
     target = mesh.attributes.new("FMQM bake", "FLOAT2", "CORNER")
     target.data.foreach_set("vector", np.concatenate([part.layout.drawn for part in parts]).ravel())
     name = target.name
+    mesh.uv_layers.active = mesh.uv_layers[name]  # the baker wants one, though it is told which
     mesh.update(calc_edges=True)
     return mesh, name
+
+
+def _numbers(mesh: bpy.types.Mesh) -> set[str]:
+    """Names of the attributes of fewer values than a color has."""
+    kept = (each for each in mesh.attributes if each.data_type in _VALUES)
+    return {each.name for each in kept if _VALUES[each.data_type][1] < 3}
 
 
 def _bend(object_: bpy.types.Object, at_rest: NDArray[np.float32], temporary: ExitStack) -> None:

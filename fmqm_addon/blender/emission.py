@@ -3,15 +3,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from contextlib import ExitStack
+from dataclasses import dataclass
 from enum import Enum
 
 import bpy
 
 from .nodes import active_output, only_shines
+from .simplified import divided
 
 # Mixing never hides one of its shaders wholly: what a transparent one covers still has a color.
 _LEAST_SHARE = 1e-4
+_NEXT_TO_NOTHING = 1e-7
 _KEPT = {"MIX_SHADER", "ADD_SHADER", "GROUP", "GROUP_INPUT", "REROUTE"}
 _TRANSPARENT = {"BSDF_TRANSPARENT", "HOLDOUT"}
 
@@ -22,6 +26,24 @@ class Shine(Enum):
 
     COLOR = 1
     WEIGHT = 2
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What a copy becomes.
+
+    Attributes:
+        numbers: see shining.
+        divided: pointers of the original image nodes whose color Cycles divides by their alpha.
+        groups: the copies made so far, by the full name of what they copy.
+        temporary: removes them.
+    """
+
+    shine: Shine
+    numbers: Collection[str]
+    divided: Collection[int]
+    groups: dict[str, bpy.types.NodeTree]
+    temporary: ExitStack
 
 
 def is_opaque(tree: bpy.types.NodeTree) -> bool:
@@ -43,12 +65,15 @@ def _with_groups(tree: bpy.types.NodeTree) -> list[bpy.types.NodeTree]:
     return trees
 
 
-def shining(material: bpy.types.Material, shine: Shine, temporary: ExitStack) -> bpy.types.Material:
+def shining(
+    material: bpy.types.Material, shine: Shine, numbers: Collection[str], temporary: ExitStack
+) -> bpy.types.Material:
     """A copy of a material whose shaders, in its node groups too, are emissions; mixes of them stay.
 
     Base color over weight is the color of a mix with transparent shaders, however they are nested.
 
     Args:
+        numbers: names of the mesh's attributes that have fewer values than a color.
         temporary: removes the copy, and those of the groups.
     """
     copy = material.copy()
@@ -56,18 +81,25 @@ def shining(material: bpy.types.Material, shine: Shine, temporary: ExitStack) ->
     tree = copy.node_tree
     output = active_output(tree)
     if output is not None:
+        for other in [each for each in tree.nodes if each.type == "OUTPUT_MATERIAL" and each != output]:
+            tree.nodes.remove(other)
         output.target = "ALL"
         for name in ("Volume", "Displacement"):
             for link in list(output.inputs[name].links):
                 tree.links.remove(link)
-    _convert(tree, shine, {}, temporary)
+    pointers = {place.node.as_pointer() for place in divided(material)}
+    _convert(tree, material.node_tree, _Task(shine, numbers, pointers, {}, temporary))
     return copy
 
 
-def _convert(
-    tree: bpy.types.NodeTree, shine: Shine, groups: dict[str, bpy.types.NodeTree], temporary: ExitStack
-) -> None:
-    """Replaces the shaders of a tree. groups: the copies made so far, by the full name of what they copy."""
+def _convert(tree: bpy.types.NodeTree, original: bpy.types.NodeTree, task: _Task) -> None:
+    """Replaces the shaders of a tree, the copy of another."""
+    for link in list(tree.links):
+        if link.is_muted or not link.is_valid:
+            tree.links.remove(link)
+    for node in original.nodes:
+        if node.as_pointer() in task.divided:
+            _use_alpha(tree, tree.nodes[node.name])
     for link in list(tree.links):
         # A color at a shader's place shines by itself.
         if link.to_socket.type == "SHADER" and link.from_socket.type != "SHADER":
@@ -75,33 +107,44 @@ def _convert(
     for node in list(tree.nodes):
         if node.type == "SHADERTORGB":
             _pass_color(tree, node)
+    kept = _KEPT | {"EMISSION"} if task.shine is Shine.COLOR else _KEPT
     for node in list(tree.nodes):
-        outputs = [socket for socket in node.outputs if socket.type == "SHADER"]
-        if not outputs or node.mute:
+        if node.mute:
             continue
+        shader = next((socket for socket in node.outputs if socket.type == "SHADER"), None)
         if node.type == "GROUP" and node.node_tree is not None:
-            node.node_tree = _group(node.node_tree, shine, groups, temporary)
+            node.node_tree = _group(node.node_tree, task)
+        elif node.type == "VERTEX_COLOR" and node.layer_name in task.numbers:
+            _read_number(tree, node)
         elif node.type == "MIX_SHADER":
-            _never_wholly(tree, node.inputs[0])
-        elif node.type not in _KEPT and not (node.type == "EMISSION" and shine is Shine.COLOR):
-            _replace(tree, node, outputs[0], shine)
+            _clamp(tree, node.inputs[0], node.inputs[0], _LEAST_SHARE, 1 - _LEAST_SHARE)
+        elif shader is not None and node.type not in kept:
+            _replace(tree, node, shader, task.shine)
 
 
-def _group(
-    tree: bpy.types.NodeTree, shine: Shine, groups: dict[str, bpy.types.NodeTree], temporary: ExitStack
-) -> bpy.types.NodeTree:
+def _group(tree: bpy.types.NodeTree, task: _Task) -> bpy.types.NodeTree:
     key = tree.name_full
-    if key not in groups:
-        groups[key] = tree.copy()
-        temporary.callback(bpy.data.node_groups.remove, groups[key])
-        _convert(groups[key], shine, groups, temporary)
-    return groups[key]
+    if key not in task.groups:
+        task.groups[key] = tree.copy()
+        task.temporary.callback(bpy.data.node_groups.remove, task.groups[key])
+        _convert(task.groups[key], tree, task)
+    return task.groups[key]
+
+
+def _read_number(tree: bpy.types.NodeTree, node: bpy.types.Node) -> None:
+    """Cycles takes what a Color Attribute node names for a color unseen, and crashes where it is shorter; an Attribute
+    node looks first."""
+    looking = tree.nodes.new("ShaderNodeAttribute")
+    looking.attribute_name = node.layer_name
+    for name in ("Color", "Alpha"):
+        for link in list(node.outputs[name].links):
+            tree.links.new(looking.outputs[name], link.to_socket)
 
 
 def _pass_color(tree: bpy.types.NodeTree, node: bpy.types.Node) -> None:
     """Shader to RGB, which Cycles lacks: the color of the shader before it, as if in full light."""
     link = next(iter(node.inputs[0].links), None)
-    wanted = None if link is None else _color_of(link.from_node)
+    wanted = None if link is None else color_of(link.from_node)
     if wanted is None:
         return
     passed = tree.nodes.new("ShaderNodeGamma")  # of 1: hands a color on
@@ -110,28 +153,31 @@ def _pass_color(tree: bpy.types.NodeTree, node: bpy.types.Node) -> None:
         tree.links.new(passed.outputs[0], each.to_socket)
 
 
-def _color_of(shader: bpy.types.Node) -> bpy.types.NodeSocket | None:
+def color_of(shader: bpy.types.Node) -> bpy.types.NodeSocket | None:
+    """The input that is a shader's base color; None if it has none or lets all light through."""
+    if shader.type in _TRANSPARENT:
+        return None
     if only_shines(shader):
         return shader.inputs["Emission Color"]
     return shader.inputs.get("Base Color") or shader.inputs.get("Color")
 
 
-def _never_wholly(tree: bpy.types.NodeTree, factor: bpy.types.NodeSocket) -> None:
-    if not factor.is_linked:
-        factor.default_value = min(max(factor.default_value, _LEAST_SHARE), 1 - _LEAST_SHARE)
-        return
+def _clamp(
+    tree: bpy.types.NodeTree, old: bpy.types.NodeSocket, new: bpy.types.NodeSocket, least: float, most: float
+) -> None:
+    """As _take_over, between two limits; both sockets may be one."""
     clamp = tree.nodes.new("ShaderNodeClamp")
-    clamp.inputs["Min"].default_value, clamp.inputs["Max"].default_value = _LEAST_SHARE, 1 - _LEAST_SHARE
-    tree.links.new(factor.links[0].from_socket, clamp.inputs["Value"])
-    tree.links.new(clamp.outputs[0], factor)
+    clamp.inputs["Min"].default_value, clamp.inputs["Max"].default_value = least, most
+    _take_over(tree, old, clamp.inputs["Value"])
+    tree.links.new(clamp.outputs[0], new)
 
 
 def _replace(tree: bpy.types.NodeTree, node: bpy.types.Node, output: bpy.types.NodeSocket, shine: Shine) -> None:
     targets = [link.to_socket for link in output.links]
     color = _emission(tree, None, targets)
     if shine is Shine.COLOR:
-        wanted = _color_of(node)
-        if node.type not in _TRANSPARENT and wanted is not None:
+        wanted = color_of(node)
+        if wanted is not None:
             _take_over(tree, wanted, color)
         if only_shines(node):
             _take_over(tree, node.inputs["Emission Strength"], color.node.inputs["Strength"])
@@ -142,18 +188,32 @@ def _replace(tree: bpy.types.NodeTree, node: bpy.types.Node, output: bpy.types.N
         tree.links.new(weights.outputs[0], color)
         weights.inputs["Red"].default_value = weights.inputs["Green"].default_value = 1
         if "Alpha" in node.inputs:
-            _take_over(tree, node.inputs["Alpha"], weights.inputs["Green"])
+            _clamp(tree, node.inputs["Alpha"], weights.inputs["Green"], 0, 1)
     tree.nodes.remove(node)
 
 
 def _keep_in_use(tree: bpy.types.NodeTree, alpha: bpy.types.NodeSocket, strength: bpy.types.NodeSocket) -> None:
-    """Cycles divides an image's color by its alpha only where the alpha is used too."""
+    """As _use_alpha, whatever lies between the image and the shader's Alpha."""
     one = tree.nodes.new("ShaderNodeMath")
     one.operation = "MULTIPLY_ADD"
-    one.inputs[1].default_value = 1e-7
+    one.inputs[1].default_value = _NEXT_TO_NOTHING
     _take_over(tree, strength, one.inputs[2])
     tree.links.new(alpha, one.inputs[0])
     tree.links.new(one.outputs[0], strength)
+
+
+def _use_alpha(tree: bpy.types.NodeTree, image: bpy.types.Node) -> None:
+    """Cycles divides an image's color by its alpha only where the alpha is used too: here it is added to the color."""
+    color, alpha = image.outputs["Color"], image.outputs["Alpha"]
+    links = list(color.links)
+    mix = tree.nodes.new("ShaderNodeMix")
+    mix.data_type, mix.blend_type = "RGBA", "ADD"
+    share, first, second = (socket for socket in mix.inputs if socket.enabled)
+    share.default_value = _NEXT_TO_NOTHING
+    tree.links.new(color, first)
+    tree.links.new(alpha, second)
+    for link in links:
+        tree.links.new(next(socket for socket in mix.outputs if socket.enabled), link.to_socket)
 
 
 def _emission(
@@ -170,8 +230,7 @@ def _emission(
 
 
 def _take_over(tree: bpy.types.NodeTree, old: bpy.types.NodeSocket, new: bpy.types.NodeSocket) -> None:
-    """What the old socket has: its link, else its value."""
+    """What the old socket has: its value, and its link, which may end in nothing."""
+    new.default_value = old.default_value
     if old.is_linked:
         tree.links.new(old.links[0].from_socket, new)
-    else:
-        new.default_value = old.default_value

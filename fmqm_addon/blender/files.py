@@ -15,7 +15,7 @@ import bpy
 
 from ..metric.errors import FileError, FMQMError, MeshError, one_line
 from ..metric.surface import MeshArrays
-from .assets import check_object, scene_members
+from .assets import check_instances, check_object, scene_members
 from .images import TextureCache
 from .lods import find_chains
 from .looks import Reading
@@ -24,7 +24,8 @@ from .remarks import left_out
 from .snapshot import placed
 from .space import Placed
 from .spec import SUFFIXES, split_spec
-from .truncated import check_alembic, check_beside, check_ply, check_usd
+from .truncated import check_alembic, check_beside, check_ply
+from .usd import check_usd
 
 
 def load_mesh(spec: str, reading: Reading = AS_FOUND) -> MeshArrays:
@@ -49,20 +50,21 @@ def load_placed(spec: str, reading: Reading = AS_FOUND, announce: Callable[[str]
     try:
         unresolved = open_file(path)
         objects = [_named(object_name, path)] if object_name else scene_members()
+        remarks = (*unresolved, *left_out(path, reading.texture is None))
+        name, cache = object_name or Path(path).name, TextureCache()
         try:
-            remarks = (*unresolved, *left_out(path, reading.texture is None))
             if not objects:
-                why = f" ({'; '.join(remarks)})" if remarks else ""
-                raise MeshError(f"no mesh in it; a surface is wanted{why}")
-            name, cache = object_name or Path(path).name, TextureCache()
+                raise MeshError("no mesh in it; a surface is wanted")
+            check_instances(objects)
             baked = to_bake(objects, reading, cache)
             if baked:
                 announce(f"baking {', '.join(baked)} (materials of {name})")
             found = placed(objects, name, reading, cache=cache)
-            warnings = tuple(one_line(f"{Path(path).name}: {remark}") for remark in remarks)
-            return replace(found, mesh=replace(found.mesh, warnings=(*warnings, *found.mesh.warnings)))
         except FMQMError as error:
-            raise type(error)(f"{spec}: {error}") from error
+            why = f" ({'; '.join(remarks)})" if remarks else ""
+            raise type(error)(f"{spec}: {str(error).removeprefix(f'{name}: ')}{why}") from error
+        warnings = tuple(one_line(f"{Path(path).name}: {remark}") for remark in remarks)
+        return replace(found, mesh=replace(found.mesh, warnings=(*warnings, *found.mesh.warnings)))
     finally:
         _clear_session()
 
@@ -92,7 +94,11 @@ def open_file(path: str) -> tuple[str, ...]:
         with redirect_stderr(StringIO()), _silent(suffix in _NOISY):
             _open(os.path.abspath(path), suffix)
     except RuntimeError as error:
-        raise FileError(f"{path}: {last_line(error)}; check the file, or export it again") from error
+        said = last_line(error)
+        remedy = "export it without this compression, or use another Blender"
+        if not any(kind in said.lower() for kind in ("draco", "meshopt")):  # whose decoders some Blenders lack
+            remedy = "check the file, or export it again"
+        raise FileError(f"{path}: {said}; {remedy}") from error
     except UnicodeEncodeError as error:
         raise FileError(f"{path}: Blender takes only names in UTF-8; rename the file or its folder") from error
     return unresolved
@@ -153,6 +159,9 @@ def _open(path: str, suffix: str) -> None:
     result = operator(filepath=path, **_OPTIONS.get(suffix, {}))
     if "FINISHED" not in result:
         raise FileError(f"{path}: the importer refused it ({', '.join(result).lower()})")
+    for image in bpy.data.images if suffix == ".usdz" else ():
+        if image.source == "FILE" and image.packed_file is not None:  # by way of a folder with a name by chance
+            image.filepath_raw = os.path.join(path, os.path.basename(image.filepath))
 
 
 _IMPORTERS: dict[str, Callable[[], bpy.types.Operator]] = {

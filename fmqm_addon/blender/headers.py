@@ -7,6 +7,7 @@ import os
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from operator import add
 from typing import BinaryIO
 
 
@@ -31,6 +32,7 @@ class Header:
         is_float: whether Blender decodes it to floats.
         is_grey_with_alpha: it has these two channels (told of PNG, TIFF, TGA and JPEG 2000).
         kind: of file, such as "png"; it does not count where headers are compared.
+        is_cut: it has no rows, or some beyond its own end (told of packed SGI).
     """
 
     width: int
@@ -38,6 +40,7 @@ class Header:
     is_float: bool = False
     is_grey_with_alpha: bool = False
     kind: str = field(default="", compare=False)
+    is_cut: bool = False
 
     @property
     def decoded(self) -> int:
@@ -213,8 +216,13 @@ def _j2k(file: BinaryIO) -> Header:
 
 
 def _sgi(file: BinaryIO) -> Header:
-    width, height = _unpack(">HH", file, 6)
-    return Header(width, height)
+    """Two tables follow the header of a packed one: where each channel's rows begin, and their lengths."""
+    packed, width, height, channels = _unpack(">BxxxHHH", file, 2)
+    rows, end = height * channels, file.seek(0, 2)
+    if packed != 1 or not rows or end < 512 + 8 * rows:
+        return Header(width, max(height, 1), is_cut=packed == 1)  # a line of pixels may have a height of 0
+    tables = _unpack(f">{2 * rows}I", file, 512)
+    return Header(width, height, is_cut=any(map(end.__lt__, map(add, tables[:rows], tables[rows:]))))
 
 
 def _dpx(file: BinaryIO) -> Header:

@@ -25,7 +25,7 @@ BRIGHTEST = 1e6  # linear light in float images is kept within this, so that not
 _LIGHT_FORMATS = frozenset({"OPEN_EXR", "OPEN_EXR_MULTILAYER", "HDR", "DPX", "CINEON"})  # hold linear light
 _IS_OLD = bpy.app.version < (5, 2)
 _ODD_KINDS = frozenset({"bmp", "jp2", "sgi", "webp"})  # whose colors an old Cycles does not multiply by alpha
-CRASHES = "Blender before 5.2 crashes at a JPEG 2000 image of grey and alpha; save it as a PNG"
+DARKEST = 1e-4  # what is not black of floats: as linear light, less than bytes can tell from it
 _BLOCK = 2**18  # floats that are converted at a time: what a processor's cache holds
 
 
@@ -36,19 +36,21 @@ class Pixels:
     Attributes:
         values: (H, W, 3 or 4) uint8, or float32 within BRIGHTEST; row 0 at the top; a fourth channel is alpha.
         linear: the values are linear light, not encoded for display.
-        associated: the colors are multiplied by alpha.
+        associated: Cycles wants the colors multiplied by alpha, and they are.
         unusual: the colors are not what Cycles samples: how it treats alpha depends here on how the file came to
-            Blender, and on Blender's version.
+            Blender, and on Blender's version; or it decodes them only after it has interpolated.
+        solid: to Cycles they have no alpha, beyond the image's edges either.
     """
 
     values: NDArray[np.uint8] | NDArray[np.float32]
     linear: bool
     associated: bool
     unusual: bool
+    solid: bool
 
 
 # Pixels that were read and that some asset may still hold, by content and by how Blender reads it.
-_held: dict[tuple[str, str, str, bool], tuple[weakref.ref[NDArray[Any]], tuple[bool, bool, bool]]] = {}
+_held: dict[tuple[str, str, str, bool], tuple[weakref.ref[NDArray[Any]], tuple[bool, bool, bool, bool]]] = {}
 
 
 class TextureCache:
@@ -91,7 +93,8 @@ class TextureCache:
             return Pixels(values, *held[1])
         pixels = read_pixels(image, limits)
         if pixels is not None:
-            _held[key] = weakref.ref(pixels.values), (pixels.linear, pixels.associated, pixels.unusual)
+            facts = pixels.linear, pixels.associated, pixels.unusual, pixels.solid
+            _held[key] = weakref.ref(pixels.values), facts
         return pixels
 
     def _once(self, key: tuple[int, int], read: Callable[[], Pixels | None]) -> Pixels | None:
@@ -134,23 +137,25 @@ def _float_pixels(image: bpy.types.Image, values: NDArray[np.float32]) -> Pixels
     has_alpha = _has_alpha(image, values)
     if values.shape[2] == 4:
         values[:, :, 3] = np.clip(values[:, :, 3], 0, 1) if has_alpha else 1
-    associated = has_alpha and _associates(image)
-    is_light = image.file_format in _LIGHT_FORMATS
+    associated = _associates(image)
+    is_light, from_file = image.file_format in _LIGHT_FORMATS, _is_from_file(image)
     # Of files, Cycles samples 16-bit integers as they are encoded; of what Blender holds, as linear light.
-    encoded = image.source == "FILE" and not (image.packed_file or image.is_dirty or is_light or is_linear(image))
+    encoded = from_file and not (is_light or is_linear(image))
     usual = is_light if image.alpha_mode == "PREMUL" else encoded
+    unusual = has_alpha and associated and (not usual or _has_odd_alpha(image))
     if encoded:
         for row in values:
-            alpha = np.where(row[:, 3:] > 0, row[:, 3:], 1) if associated else 1
+            alpha = np.where(row[:, 3:] > 0, row[:, 3:], 1) if has_alpha and associated else 1
             row[:, :3] = encode_srgb(row[:, :3] / alpha) * alpha
-    return Pixels(values, linear=not encoded, associated=associated, unusual=associated and not usual)
+    late = from_file and is_light and image.colorspace_settings.name == "sRGB"
+    return Pixels(values, not encoded, associated, unusual or late, _is_solid(image))
 
 
 def _byte_pixels(image: bpy.types.Image, values: NDArray[np.float32]) -> Pixels:
     """The values are the file's bytes / 255; kept are those, at a quarter of the size."""
     height, width, depth = values.shape
     has_alpha = _has_alpha(image, values)
-    associated = has_alpha and _associates(image)
+    associated = _associates(image)
     result: NDArray[np.uint8] = np.empty((height, width, 4 if has_alpha else 3), np.uint8)
     upwards = result[::-1]
     for rows in _row_blocks(values):
@@ -158,13 +163,21 @@ def _byte_pixels(image: bpy.types.Image, values: NDArray[np.float32]) -> Pixels:
         values[rows] += 0.5
         block = values[rows].astype(np.uint8)
         upwards[rows] = block[:, :, : result.shape[2]] if depth >= 3 else block[:, :, :1]
-        if associated:  # rounded down, as Cycles does
+        if has_alpha and associated:  # rounded down, as Cycles does
             color = upwards[rows, :, :3]
             color[...] = color.astype(np.uint16) * block[:, :, 3:] // 255
-    from_file = associated and image.source == "FILE" and not (image.packed_file or image.is_dirty)
-    odd = from_file and _has_odd_alpha(image)
-    unusual = associated and (image.alpha_mode == "PREMUL" or odd)
-    return Pixels(result, linear=is_linear(image), associated=associated, unusual=unusual)
+    unusual = has_alpha and associated and (image.alpha_mode == "PREMUL" or _has_odd_alpha(image))
+    return Pixels(result, is_linear(image), associated, unusual, _is_solid(image))
+
+
+def _is_from_file(image: bpy.types.Image) -> bool:
+    """Whether Cycles opens the file of an image by itself, instead of taking what Blender holds."""
+    return image.source == "FILE" and not (image.packed_file or image.is_dirty)
+
+
+def _is_solid(image: bpy.types.Image) -> bool:
+    """Whether Cycles keeps an image, whose pixels are there, in a single channel."""
+    return bool(image.depth == (32 if image.is_float else 8)) and _is_from_file(image)
 
 
 def _has_alpha(image: bpy.types.Image, values: NDArray[np.float32]) -> bool:
@@ -183,7 +196,8 @@ def _row_blocks(values: NDArray[Any]) -> list[slice]:
 
 def black_warnings(name: str, values: NDArray[Any]) -> tuple[str, ...]:
     """One, where an image shows nothing but black, as those do that Blender cannot decode and calls loaded."""
-    if any(values[rows, :, :3].any() for rows in _row_blocks(values)):
+    darkest = 1 if values.dtype == np.uint8 else DARKEST
+    if any((values[rows, :, :3] >= darkest).any() for rows in _row_blocks(values)):
         return ()
     return (f"{name} is black all over; unless it is meant to be, Blender could not decode it: save it as a PNG",)
 
@@ -200,7 +214,7 @@ def _associates(image: bpy.types.Image) -> bool:
 
 def _has_odd_alpha(image: bpy.types.Image) -> bool:
     """Whether Cycles does not multiply the colors of an image's file by alpha where it does those of others."""
-    header = image_header(image)
+    header = image_header(image) if _is_from_file(image) else None
     return header is not None and (header.is_grey_with_alpha or (_IS_OLD and header.kind in _ODD_KINDS))
 
 
@@ -304,14 +318,18 @@ def check_limits(image: bpy.types.Image, limits: Limits) -> None:
         _check(header, image_path(image) or image.name, limits)
 
 
-def crashes(header: Header | None) -> bool:
-    """Whether this Blender crashes as soon as it loads an image with such a header."""
-    return _IS_OLD and header is not None and header.kind == "jp2" and header.is_grey_with_alpha
+def crashes(header: Header | None) -> str:
+    """Why an image with such a header must not be loaded: a Blender would crash; "" where it may."""
+    if _IS_OLD and header is not None and header.kind == "jp2" and header.is_grey_with_alpha:
+        return "Blender before 5.2 crashes at a JPEG 2000 image of grey and alpha; save it as a PNG"
+    if header is not None and header.is_cut:
+        return "the image is broken, its rows are not where it says; save it again"
+    return ""
 
 
 def _check(header: Header, name: str, limits: Limits) -> None:
-    if crashes(header):
-        raise MeshError(f"{name}: {CRASHES}")
+    if why := crashes(header):
+        raise MeshError(f"{name}: {why}")
     size = f"{header.width} x {header.height} pixels"
     if max(header.width, header.height) > limits.side:
         raise ImageSizeError(f"{name}: the image promises {size}, more than the {limits.side} a side that are allowed")
@@ -391,8 +409,8 @@ def load_texture(path: str, limits: Limits = DEFAULT_LIMITS) -> Texture:
     """
     if not os.path.isfile(path):
         raise FileError(f"{path}: no such image file")
-    if crashes(file_header(path)):
-        raise FileError(f"{path}: {CRASHES}")
+    if why := crashes(file_header(path)):
+        raise FileError(f"{path}: {why}")
     try:
         image = bpy.data.images.load(path, check_existing=False)
     except RuntimeError as error:

@@ -10,9 +10,10 @@ import bpy
 
 from ..metric.color import ImageFacts, Material
 from ..metric.errors import MeshError
+from .emission import color_of
 from .images import TextureCache, black_warnings
 from .looks import Layer, Look, Reading, Unread
-from .nodes import NotReadError, node_count, only_shines, outputs, surface_of, upstream, uses_nodes
+from .nodes import NotReadError, node_count, outputs, surface_of, upstream, uses_nodes
 from .reader import FIRST_ROLES, Reader, plain_color
 
 DEFAULT_GREY = 0.8  # linear base color that Blender gives a surface without a material
@@ -64,14 +65,15 @@ def _read_look(material: bpy.types.Material | None, cache: TextureCache, reading
 
 
 def plain_look(material: bpy.types.Material, warning: str) -> Look:
-    """The plain color of a material that cannot be read where baking is forbidden: that of its shader, which shows
-    where nothing is linked to it, else its viewport color."""
+    """The plain color of a material that cannot be read where baking is forbidden: that of its first shader that has
+    one, which shows where nothing is linked to it, else its viewport color."""
     color = material.diffuse_color
     surface = surface_of(material)
     if surface is not None:
-        shader = next((node for node, _ in upstream(surface) if node.type == "BSDF_PRINCIPLED"), None)
-        if shader is not None:
-            color = shader.inputs["Emission Color" if only_shines(shader) else "Base Color"].default_value
+        shaders = [node for node, _ in upstream(surface) if any(socket.type == "SHADER" for socket in node.outputs)]
+        socket = next((found for found in map(color_of, shaders) if found is not None), None)
+        if socket is not None:
+            color = socket.default_value
     return Look(Material(material.name, plain_color(color[:3]), how="plain"), (), (warning,))
 
 

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 from typing import Any
 
 import bpy
@@ -19,14 +20,15 @@ from ..metric.errors import MeshError, one_line
 from ..metric.spatial import Floats
 from ..metric.surface import MeshArrays, join_meshes
 from .assets import disabled_when_instanced, instanced
-from .bake import Baked, bake_slots
+from .bake import Baked, bake_slots, copy_properties
 from .evaluate import Evaluated, Shown, evaluated, shown
-from .images import TextureCache
+from .images import DARKEST, TextureCache
 from .looks import Layer, Look, Reading, Unread
 from .material import plain_look, read_look
 
 AS_FOUND = Reading()  # with the images that the file names, baking what must be
 _WORKING_SPACE = "Linear Rec.709"  # what plain colors and color attributes are taken to be in
+_MOST_BEYOND = 0.5  # of an attribute's values; a few bright ones may be meant
 _NAMED = 2  # of the objects that share a warning
 # What scans have: colors, and no material.
 _VERTEX_COLORS = Look(Material("", Encoded(VertexColor(0)), how="none"), (Layer("color", ""),))
@@ -105,11 +107,11 @@ def to_bake(objects: Sequence[bpy.types.Object], reading: Reading, cache: Textur
         return ()
     with evaluated(objects) as found:
         names = {
-            slot.material.name
+            material.name
             for each in shown(found)
             if not each.particle
-            for slot in each.object.material_slots
-            if slot.material is not None and _is_unread(slot.material, each.object.data, reading, cache)
+            for material in slot_materials(each.object)
+            if material is not None and _is_unread(material, each.object.data, reading, cache)
         }
     return tuple(sorted(names))
 
@@ -120,7 +122,7 @@ def _is_unread(material: bpy.types.Material, data: bpy.types.ID, reading: Readin
         look = read_look(material, cache, reading)
     except MeshError:  # mesh_arrays says so, if a face has it
         return False
-    return isinstance(look, Unread) or (isinstance(data, bpy.types.Mesh) and _odd_attribute(data, look) is not None)
+    return isinstance(look, Unread) or (isinstance(data, bpy.types.Mesh) and isinstance(_on_mesh(data, look), Unread))
 
 
 @dataclass(frozen=True)
@@ -140,14 +142,14 @@ class _Slot:
     Attributes:
         material: in the slot. look: of the material.
         rows: of its triangles. corners: (rows, 3, K) float32, what the look's layers hold there.
-        missing: warnings of the layers that the mesh has not.
+        warnings: of layers that the mesh has not, and of colors that cannot be meant.
     """
 
     material: bpy.types.Material | None
     look: Look | Unread
     rows: _Rows
     corners: NDArray[np.float32]
-    missing: tuple[str, ...]
+    warnings: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -183,7 +185,7 @@ class _Triangles:
 def _key(each: Shown) -> _Key:
     """Equal for what has the same mesh and the same materials."""
     mesh = each.object.original if each.edited else each.object.data  # edit mode: modifiers are each object's own
-    materials = (slot.material for slot in each.object.material_slots)
+    materials = slot_materials(each.object)
     return (mesh.as_pointer(), *(0 if found is None else found.as_pointer() for found in materials))
 
 
@@ -198,7 +200,7 @@ def _read_shape(each: Shown, cache: TextureCache, reading: Reading, temporary: E
             return None
         if reading.texture is not None and not len(mesh.uv_layers):
             raise MeshError(f"{each.name}: the mesh has no UV map, which the given image needs; unwrap it first")
-        cut = _triangulated(mesh)
+        cut = _triangulated(mesh, each.name)
         slots = {
             index: _read_slot(mesh, cut, rows, _slot_material(object_, index), cache, reading)
             for index, rows in _rows_by_slot(mesh, cut).items()
@@ -221,11 +223,20 @@ def _read_shape(each: Shown, cache: TextureCache, reading: Reading, temporary: E
         object_.to_mesh_clear()
 
 
-def _triangulated(mesh: bpy.types.Mesh) -> _Triangles:
+def _triangulated(mesh: bpy.types.Mesh, name: str) -> _Triangles:
+    """Raises MeshError where Blender, which trusts its meshes, would read beyond its arrays."""
+    corrupt = MeshError(f"{name}: its faces name corners or vertices that it has not; mesh.validate() mends that")
+    if ".corner_vert" not in mesh.attributes:
+        raise corrupt
     vertex = _attribute(mesh, ".corner_vert", "value", 1, np.int32)[:, 0]
+    if vertex.min(initial=0) < 0 or vertex.max(initial=0) >= len(mesh.vertices):
+        raise corrupt
     if len(vertex) == 3 * len(mesh.polygons):  # Blender's own triangles are slow to read
         loops = np.arange(len(vertex), dtype=np.int32).reshape(-1, 3)
     else:
+        starts = _read(mesh.polygons, "loop_start", (len(mesh.polygons),), np.int32)
+        if starts[0] != 0 or np.diff(starts, append=len(vertex)).min() < 3:
+            raise corrupt
         loops = _read(mesh.loop_triangles, "loops", (len(mesh.loop_triangles), 3), np.int32)
     return _Triangles(loops, vertex[loops])
 
@@ -243,10 +254,21 @@ def _rows_by_slot(mesh: bpy.types.Mesh, cut: _Triangles) -> dict[int, _Rows]:
     return {index: np.flatnonzero(of_face == index) for index in indices}
 
 
+def slot_materials(object_: bpy.types.Object) -> list[bpy.types.Material | None]:
+    """What an evaluated object's slots show."""
+    materials = [slot.material for slot in object_.material_slots]
+    if bpy.app.version < (5, 2):
+        return materials
+    # Of a slot that is linked to the object and empty there, the evaluated object tells the mesh's material, which
+    # renders do not show.
+    kept = [slot.link == "OBJECT" and slot.material is None for slot in object_.original.material_slots]
+    return [None if empty else found for found, empty in zip_longest(materials, kept[: len(materials)])]
+
+
 def _slot_material(object_: bpy.types.Object, index: int) -> bpy.types.Material | None:
     """Blender draws a face whose slot does not exist with the last slot there is, or with the first."""
-    slots = object_.material_slots
-    return slots[min(max(index, 0), len(slots) - 1)].material if len(slots) else None
+    materials = slot_materials(object_)
+    return materials[min(max(index, 0), len(materials) - 1)] if materials else None
 
 
 def _read_slot(
@@ -261,26 +283,33 @@ def _read_slot(
         look: Look | Unread = _VERTEX_COLORS
     else:
         look = read_look(material, cache, reading)
-        odd = _odd_attribute(mesh, look) if isinstance(look, Look) else None
-        if isinstance(look, Look) and odd is not None:
-            look = Unread(odd, "is an attribute of a kind that is not read", look.material.images, look.warnings)
-    missing = []
+        look = _on_mesh(mesh, look) if isinstance(look, Look) else look
+    warnings: list[str] = []
     values = [np.empty((*cut.loops[rows].shape, 0), np.float32)]
-    for layer in () if isinstance(look, Unread) else look.layers:
+    layers = () if isinstance(look, Unread) else look.layers
+    for layer in layers:
         found = _layer_values(mesh, layer, cut, rows)
         if found is None:
-            missing.append(_missing(layer, material))
+            warnings.append(_missing(layer, material))
             found = np.zeros((len(values[0]), 3, layer.width), np.float32)
+        elif layer.kind == "color" and len(layers) == 1:  # nothing else gives it color
+            warnings += _out_of_range(layer, found[:, :, :3])
         values.append(found)
     corners = values[-1] if len(values) <= 2 else np.concatenate(values, axis=2)
-    return _Slot(material, look, rows, corners, tuple(missing))
+    return _Slot(material, look, rows, corners, tuple(warnings))
 
 
-def _odd_attribute(mesh: bpy.types.Mesh, look: Look) -> str | None:
-    """An attribute that a look wants and that the mesh has, but neither as a UV map nor as a color attribute: Cycles
-    reads those of any domain and type, which Geometry Nodes make."""
-    names = (layer.name for layer in look.layers if layer.name in mesh.attributes and _layer_of(mesh, layer) is None)
-    return next(names, None)
+def _on_mesh(mesh: bpy.types.Mesh, look: Look) -> Look | Unread:
+    """A look, or what the baker has to make of it on this mesh."""
+    known = look.material.images, look.warnings
+    for layer in look.layers:
+        if _layer_of(mesh, layer) is not None:
+            continue
+        if layer.name in mesh.attributes:  # of any domain and type, as Geometry Nodes make them
+            return Unread(layer.name, "is an attribute of a kind that is not read", *known)
+        if layer.kind == "color" and look.material.alpha is not None:  # its alpha depends on the node that asks
+            return Unread(f"the color attribute {layer.name}".rstrip(), "is missing on the mesh", *known)
+    return look
 
 
 def _missing(layer: Layer, material: bpy.types.Material | None) -> str:
@@ -288,6 +317,17 @@ def _missing(layer: Layer, material: bpy.types.Material | None) -> str:
     named = f" named {layer.name}" if layer.name else ""
     user = "its color" if material is None else f"material {material.name}"
     return f"the mesh has no {kind}{named}, which {user} needs; taken as 0, as Blender renders it"
+
+
+def _out_of_range(layer: Layer, light: NDArray[np.float32]) -> list[str]:
+    """Of colors that an exporter wrote as other numbers than Blender reads them."""
+    named = f"the color attribute {layer.name}".rstrip()
+    if light.max() < DARKEST:
+        return [f"{named} is black all over; unless it is meant to be, export its colors as bytes, or from 0 to 1"]
+    beyond = np.mean(light > 1)
+    if beyond > _MOST_BEYOND:
+        return [f"{named} is beyond 1, and shown as 1, in {100 * beyond:.0f} % of its values; export them from 0 to 1"]
+    return []
 
 
 def _layer_values(mesh: bpy.types.Mesh, layer: Layer, cut: _Triangles, rows: _Rows) -> NDArray[np.float32] | None:
@@ -335,7 +375,7 @@ def _as_arrays(shape: _Shape, reading: Reading) -> MeshArrays:
             material[rows] = row
             corners[rows, :, : values.shape[2]] = values
     looks = [look for look, _ in resolved.values()]
-    missing = (warning for slot in shape.slots.values() for warning in slot.missing)
+    of_slots = (warning for slot in shape.slots.values() for warning in slot.warnings)
     return MeshArrays(
         name="",
         positions=shape.positions.astype(np.float64),
@@ -343,7 +383,7 @@ def _as_arrays(shape: _Shape, reading: Reading) -> MeshArrays:
         corners=corners,
         material=material,
         materials=tuple(look.material for look in looks),
-        warnings=(*(warning for look in looks for warning in look.warnings), *missing),
+        warnings=(*(warning for look in looks for warning in look.warnings), *of_slots),
     )
 
 
@@ -379,6 +419,7 @@ def _bakeable(shape: _Shape) -> Iterator[bpy.types.Object]:
     try:
         stand_in.matrix_world = Matrix(shape.matrix.tolist())  # kept as it is, shears too: the object is in no scene
         stand_in.color, stand_in.pass_index = shape.source.color, shape.source.pass_index
+        copy_properties(shape.source, stand_in)
         yield stand_in
     finally:
         bpy.data.objects.remove(stand_in)

@@ -12,6 +12,7 @@ import bpy
 
 from ..metric.errors import FMQMError
 
+_IS_OLD = bpy.app.version < (5, 2)
 DEEPEST = 100  # groups within groups
 _ROLES = {"Base Color": "base color", "Color": "base color", "Alpha": "alpha", "Fac": "alpha", "Factor": "alpha"}
 
@@ -80,37 +81,45 @@ def _link(socket: bpy.types.NodeSocket) -> bpy.types.NodeLink | None:
     return next((link for link in socket.links if link.is_valid and not link.is_muted), None)
 
 
-def source(place: Place) -> Place:
+def source(place: Place, converting: bool = False) -> Place:
     """The output that feeds an input, through reroutes, muted nodes and groups; where none does, the input whose own
-    value counts.
+    value counts: since Blender 5.2 never one of a reroute or a muted node.
+
+    Args:
+        converting: follow it also where a color becomes a number, or a number a color, on its way.
 
     Raises:
         NotReadError: the way there cannot be followed.
     """
-    wanted = family(place.socket)
+    wanted, own = family(place.socket), place
     while (link := _link(place.socket)) is not None:
         output, node = link.from_socket, link.from_node
         if node.type == "REROUTE":
             place = Place(node.inputs[0], place.groups)
         elif node.mute:
             through = next((inner.from_socket for inner in node.internal_links if inner.to_socket == output), None)
-            if through is None:
+            if _IS_OLD and (through is None or _link(through) is None):
                 raise NotReadError(node, "is muted and lets nothing through")
+            if through is None:
+                return own
             place = Place(through, place.groups)
         elif node.type == "GROUP":
-            place = Place(_group_result(node, output.identifier), (*place.groups, node))
+            own = place = Place(_group_result(node, output.identifier), (*place.groups, node))
         elif node.type == "GROUP_INPUT":
-            place = Place(by_identifier(place.groups[-1].inputs, output.identifier, node), place.groups[:-1])
+            own = place = Place(by_identifier(place.groups[-1].inputs, output.identifier, node), place.groups[:-1])
         else:
             return Place(output, place.groups)
-        if family(place.socket) != wanted:
+        if family(place.socket) != wanted and not converting:
             raise NotReadError(node, "turns a color into a number or a number into a color")
-    return place
+    return place if _IS_OLD else own
 
 
 def family(socket: bpy.types.NodeSocket) -> str:
-    """The kind of what a socket carries: VECTOR for colors too, VALUE for all numbers, SHADER."""
-    return {"RGBA": "VECTOR", "INT": "VALUE", "BOOLEAN": "VALUE"}.get(socket.type, socket.type)
+    """The kind of what a socket carries: VECTOR for colors too, SHADER, VALUE for numbers; for whole ones too since
+    Blender 5.2, which no longer rounds what passes such a socket."""
+    if socket.type in {"INT", "BOOLEAN"} and not _IS_OLD:
+        return "VALUE"
+    return "VECTOR" if socket.type == "RGBA" else socket.type
 
 
 def _group_result(node: bpy.types.Node, identifier: str) -> bpy.types.NodeSocket:
@@ -136,11 +145,12 @@ def by_identifier(sockets: Any, identifier: str, node: bpy.types.Node) -> bpy.ty
 def only_shines(node: bpy.types.Node) -> bool:
     """Whether all that is seen of a Principled BSDF is its emission: the base color is plain black, as in glTF files
     of what has no light on it."""
-    if node.type != "BSDF_PRINCIPLED" or node.inputs["Base Color"].is_linked:
+    if node.type != "BSDF_PRINCIPLED" or _link(node.inputs["Base Color"]) is not None:
         return False
     base, color, strength = (node.inputs[name] for name in ("Base Color", "Emission Color", "Emission Strength"))
-    lit = strength.is_linked or strength.default_value > 0
-    return lit and max(base.default_value[:3]) <= 0 and (color.is_linked or max(color.default_value[:3]) > 0)
+    lit = _link(strength) is not None or strength.default_value > 0
+    shines = _link(color) is not None or max(color.default_value[:3]) > 0
+    return lit and shines and max(base.default_value[:3]) <= 0
 
 
 def upstream(start: Place) -> Iterator[tuple[bpy.types.Node, str]]:
@@ -161,7 +171,7 @@ def upstream_outputs(
     while queue:
         asking, role = queue.pop(0)
         try:
-            place = source(asking)
+            place = source(asking, converting=True)
         except NotReadError:
             continue
         key = (place.socket.as_pointer(), tuple(group.as_pointer() for group in place.groups), role)

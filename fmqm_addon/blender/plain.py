@@ -11,6 +11,7 @@ import numpy as np
 from mathutils import Matrix
 
 from .evaluate import Evaluated, Shown, evaluated, shown
+from .mesh import slot_materials
 
 _KEPT = ("EMPTY", "LIGHT", "CAMERA")  # beside what is measured
 _SHEARED = 1e-5  # of the longest axis; below it is rounding
@@ -97,7 +98,7 @@ def _surfaces(measured: list[Evaluated]) -> dict[str, list[_Surface]]:
     for each in shown(measured):
         if each.particle:
             continue
-        materials = [slot.material and slot.material.original for slot in each.object.material_slots]
+        materials = [found and found.original for found in slot_materials(each.object)]
         key = (each.object.data.as_pointer(), *(0 if found is None else found.as_pointer() for found in materials))
         if key not in meshes:
             meshes[key] = _copied(each, materials)

@@ -45,7 +45,6 @@ from ..metric.color import (
 from ..metric.errors import ImageMissingError
 from .images import (
     BRIGHTEST,
-    LINEAR_SPACES,
     Pixels,
     TextureCache,
     black_warnings,
@@ -114,7 +113,7 @@ class Reader:
         self._cache = cache
         self._reading = reading
         self._nodes = 0
-        self._in_alpha = False
+        self._lost: float | None = None  # what an image that is missing counts as in an opacity; None in colors
         self._used_alphas = used_alphas(material)
 
     def look(self) -> tuple[Color, Alpha | None]:
@@ -167,21 +166,32 @@ class Reader:
         return _scaled(self._light(place.input(f"{prefix}Color")), (strength,) * 3, (0.0,) * 3)
 
     def _mixed_shader(self, place: Place) -> tuple[Light | _Transparent, Value]:
-        factor = self._value(place.input(0))
-        if isinstance(factor, Constant) and (factor.number <= 0 or factor.number >= 1):
-            return self._shader(place.input(2 if factor.number >= 1 else 1))
+        share = _clamped(self._factor(place))
+        if isinstance(share, Constant) and share.number in {0, 1}:
+            shown, hidden = (2, 1) if share.number else (1, 2)
+            light, value = self._shader(place.input(shown))
+            if isinstance(light, _Transparent):  # what it covers still has a color
+                light, _ = self._shader(place.input(hidden))
+            return light, value
         (first, first_alpha), (second, second_alpha) = self._shader(place.input(1)), self._shader(place.input(2))
-        share: Value = Arithmetic("minimum", Arithmetic("maximum", factor, Constant(0.0)), Constant(1.0))
         if isinstance(first, _Transparent):
-            return second, _product(share, second_alpha)
+            return second, _product(share, _clamped(second_alpha))
         if isinstance(second, _Transparent):
-            return first, _product(Arithmetic("subtract", Constant(1.0), share), first_alpha)
+            return first, _product(_arithmetic("subtract", Constant(1.0), share), _clamped(first_alpha))
         raise NotReadError(place.node, "mixes two shaders")
+
+    def _factor(self, place: Place) -> Value:
+        """Of a mix of shaders. An image that is missing hides the transparent one."""
+        self._lost = 0.0 if place.input(2).node.type == "BSDF_TRANSPARENT" else 1.0
+        try:
+            return self._value(place.input(0))
+        finally:
+            self._lost = None
 
     def _opacity(self, place: Place) -> Value:
         """The value at Alpha; opaque, with a warning, where it is not read."""
         known = len(self.layers)
-        self._in_alpha = True
+        self._lost = 1.0
         try:
             return self._value(place)
         except NotReadError as error:
@@ -189,7 +199,7 @@ class Reader:
             self.warnings.append(f"material {self._name}: its Alpha depends on {error}; it counts as opaque")
             return Constant(1.0)
         finally:
-            self._in_alpha = False
+            self._lost = None
 
     def _count(self, place: Place) -> None:
         self._nodes += 1
@@ -251,9 +261,13 @@ class Reader:
         """The color attribute that a node names; None where it names none."""
         if node.type == "VERTEX_COLOR":
             return VertexColor(self.channel(Layer("color", node.layer_name)))
-        if node.attribute_type != "GEOMETRY":
+        if not _is_of_mesh(node):
             raise NotReadError(node, "reads no attribute of the mesh")
-        return VertexColor(self.channel(Layer("color", node.attribute_name))) if node.attribute_name else None
+        if node.attribute_name:
+            return VertexColor(self.channel(Layer("color", node.attribute_name)))
+        told = f"material {self._name}: {node.name} names no attribute; it is black, as Blender renders it"
+        self.warnings.append(told)
+        return None
 
     def check_images(self) -> None:
         """Of what is to be baked: Cycles would decode images of any size, and show missing ones in magenta, silently.
@@ -261,7 +275,7 @@ class Reader:
         Raises:
             MeshError: as read_look.
         """
-        self._in_alpha = False
+        self._lost = None
         for node, role in dict.fromkeys(upstream(self._surface)):
             if node.type != "TEX_IMAGE" or role not in FIRST_ROLES:
                 continue
@@ -272,8 +286,8 @@ class Reader:
 
     def _missing(self, node: bpy.types.Node) -> Light:
         """What stands in for an image that is missing or broken."""
-        if self._in_alpha:
-            return PlainLight((1.0, 1.0, 1.0))
+        if self._lost is not None:
+            return PlainLight((self._lost,) * 3)
         what = f"{node.name}, which feeds Base Color, holds no image" if node.image is None else why_unread(node.image)
         what = f"material {self._name}: {what}"
         if not self._reading.stand_in:
@@ -291,9 +305,9 @@ class Reader:
             return Constant(_finite(float(socket.default_value)))
         if node.type == "TEX_IMAGE":
             texture = self._texture(place)
-            return Constant(1.0) if texture is None else ImageAlpha(texture)
+            return Constant(self._lost if self._lost is not None else 1.0) if texture is None else ImageAlpha(texture)
         if node.type == "VERTEX_COLOR" or (node.type == "ATTRIBUTE" and socket.name == "Alpha"):
-            return self._attribute(node) or Constant(0.0)
+            return self._attribute(node) or Constant(1.0)
         if node.type == "LIGHT_PATH" and socket.name.startswith("Is "):
             return Constant(float(socket.name == "Is Camera Ray"))  # the eye's
         if node.type == "SEPXYZ" or (node.type == "SEPARATE_COLOR" and node.mode == "RGB"):
@@ -340,23 +354,25 @@ class Reader:
         if pixels is None:
             return None
         texture = self._sampler(place, pixels, placement)
-        if node.image.source == "FILE" and not self._in_alpha:
+        if node.image.source == "FILE" and self._lost is None:
             told = black_warnings(image_path(node.image) or node.image.name, pixels.values)
             self.warnings += [f"material {self._name}: {warning}" for warning in told]
         return texture
 
     def _sampler(self, place: Place, pixels: Pixels, placement: Placement) -> Texture:
         node = place.node
-        if pixels.values.dtype == np.uint8 and node.image.colorspace_settings.name not in LINEAR_SPACES | {"sRGB"}:
+        if not pixels.linear and node.image.colorspace_settings.name != "sRGB":
             raise NotReadError(node, f"has an image in the color space {node.image.colorspace_settings.name}")
         if pixels.unusual:
-            raise NotReadError(node, "has an image that stores its alpha in an unusual way")
+            raise NotReadError(node, "has an image that is stored in an unusual way")
+        has_alpha = not pixels.solid and (pixels.values.shape[2] == 4 or node.extension == "CLIP")
         return Texture(
             pixels.values,
             extension=_EXTENSIONS[node.extension],
             interpolation=_INTERPOLATIONS[node.interpolation],
             linear=pixels.linear,
-            unassociate=pixels.associated and self._uses_alpha(place),
+            unassociate=has_alpha and pixels.associated and self._uses_alpha(place),
+            solid=pixels.solid,
             placement=placement,
         )
 
@@ -442,7 +458,7 @@ class Reader:
             return "", Matrix.Identity(4)
         if node.type == "UVMAP" and not node.from_instancer:
             return node.uv_map, Matrix.Identity(4)
-        if node.type == "ATTRIBUTE" and node.attribute_type == "GEOMETRY" and node.attribute_name:
+        if _is_of_mesh(node) and node.attribute_name and socket.name in {"Vector", "Color"}:
             return node.attribute_name, Matrix.Identity(4)
         if node.type == "MAPPING":
             name, before = self._uv(place.input("Vector"))
@@ -479,6 +495,10 @@ def _has_pixels(image: bpy.types.Image | None) -> bool:
     if image.source == "SEQUENCE":  # of which Blender tells no size
         return os.path.isfile(image_path(image)) or image.packed_file is not None
     return bool(image.size[0]) or image.type == "MULTILAYER"
+
+
+def _is_of_mesh(node: bpy.types.Node) -> bool:
+    return bool(node.type == "ATTRIBUTE" and node.attribute_type == "GEOMETRY")
 
 
 def _is_mapped(mapping: bpy.types.TexMapping) -> bool:
@@ -519,6 +539,11 @@ def _arithmetic(operation: Operation, first: Value, second: Value, clamp: bool =
     value = Arithmetic(operation, first, second, clamp)
     constant = isinstance(first, Constant) and isinstance(second, Constant)
     return Constant(_finite(float(value.value_at(_NOWHERE)[0]))) if constant else value
+
+
+def _clamped(value: Value) -> Value:
+    """To [0, 1]."""
+    return _arithmetic("add", value, Constant(0.0), clamp=True)
 
 
 def _product(first: Value, second: Value) -> Value:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import bpy
 
+from .images import same_content
 from .nodes import NotReadError, Place, family, outputs, source, upstream_outputs
 
 # Of the kinds of nodes that images' vectors are read from: the settings that make two of them unlike.
@@ -19,6 +20,15 @@ _SETTINGS = {
     "COMBXYZ": (),
     "SEPXYZ": (),
 }
+_NOTHING = 1e-5  # what Cycles takes for no weight at all
+# Of a Principled BSDF since Blender 5.2: what is left out without a weight.
+_LOBES = {
+    "Subsurface Weight": ("Subsurface Radius", "Subsurface Scale", "Subsurface IOR", "Subsurface Anisotropy"),
+    "Coat Weight": ("Coat IOR", "Coat Roughness", "Coat Tint"),
+    "Sheen Weight": ("Sheen Roughness", "Sheen Tint"),
+    "Anisotropic": ("Anisotropic Rotation", "Tangent"),
+    "Thin Film Thickness": ("Thin Film IOR",),
+}
 
 
 def used_alphas(material: bpy.types.Material) -> list[Place]:
@@ -28,6 +38,24 @@ def used_alphas(material: bpy.types.Material) -> list[Place]:
     return [place for place in used if place.node.type == "TEX_IMAGE" and place.socket.name == "Alpha"]
 
 
+def divided(material: bpy.types.Material) -> list[Place]:
+    """The color outputs of image nodes, of those that feed the surface, that Cycles divides by their alpha."""
+    alphas = used_alphas(material)
+    beside = {(place.node, place.groups) for place in alphas}
+    once = {place.node: place for place in alphas}.values()  # groups within groups can be used any number of times
+    colors = dict.fromkeys(place for start in outputs(material, ("Surface",)) for place, _ in upstream_outputs(start))
+    return [
+        place
+        for place in colors
+        if place.node.type == "TEX_IMAGE"
+        and place.socket.name == "Color"
+        and (
+            (place.node, place.groups) in beside
+            or any(same_content(place.node.image, other.node.image) and merged(place, other) for other in once)
+        )
+    ]
+
+
 def merged(one: Place, other: Place) -> bool:
     """Whether Cycles makes one node of those of two outputs, having equal settings and inputs, whatever image they
     show. Their place in the trees does not matter."""
@@ -35,10 +63,19 @@ def merged(one: Place, other: Place) -> bool:
     names = _SETTINGS.get(first.type)
     if names is None or first.type != second.type:
         return False
-    if any(getattr(first, name) != getattr(second, name) for name in names):
+    if any(getattr(first, name) != getattr(second, name) for name in names) or _mapping(first) != _mapping(second):
         return False
     pairs = zip(first.inputs, second.inputs, strict=True)
     return all(_same(Place(mine, one.groups), Place(its, other.groups)) for mine, its in pairs)
+
+
+def _mapping(node: bpy.types.Node) -> list[object]:
+    """The settings of an image node's own, hidden mapping."""
+    if node.type != "TEX_IMAGE":
+        return []
+    mapping = node.texture_mapping
+    values = (getattr(mapping, each.identifier) for each in mapping.bl_rna.properties)
+    return [tuple(value) if hasattr(value, "__len__") else value for value in values]
 
 
 def _same(one: Place, other: Place) -> bool:
@@ -80,7 +117,7 @@ def _constant(place: Place) -> tuple[float, ...] | None:
     if place.socket.is_output and place.node.type not in {"RGB", "VALUE"}:
         return None
     value = place.socket.default_value
-    return (value,) if family(place.socket) == "VALUE" else tuple(value)
+    return tuple(value) if family(place.socket) == "VECTOR" else (value,)
 
 
 def _dropped(place: Place) -> list[bpy.types.NodeSocket]:
@@ -96,8 +133,8 @@ def _dropped(place: Place) -> list[bpy.types.NodeSocket]:
 
     if node.type == "EMISSION" and is_(inputs["Strength"], 0):
         return [inputs["Color"]]
-    if node.type == "BSDF_PRINCIPLED" and is_(inputs["Emission Strength"], 0):
-        return [inputs["Emission Color"]]
+    if node.type == "BSDF_PRINCIPLED":
+        return _idle_lobes(place)
     if node.type in {"MIX", "MIX_RGB", "MIX_SHADER"}:
         factor, first, second = (socket for socket in inputs if socket.enabled)  # of the node's kind of data
         hides = getattr(node, "blend_type", "MIX") == "MIX"
@@ -105,3 +142,20 @@ def _dropped(place: Place) -> list[bpy.types.NodeSocket]:
     if node.type == "MATH" and node.operation == "MULTIPLY" and (is_(inputs[0], 0) or is_(inputs[1], 0)):
         return [inputs[0], inputs[1]]
     return []
+
+
+def _idle_lobes(place: Place) -> list[bpy.types.NodeSocket]:
+    """The inputs of a Principled BSDF that its own weights leave out."""
+
+    def is_nothing(name: str) -> bool:
+        try:
+            value = _constant(place.input(name))
+        except NotReadError:
+            return False
+        return value is not None and max(value[:3]) <= _NOTHING
+
+    emission = ("Emission Color", "Emission Strength")
+    idle = list(emission) if any(is_nothing(name) for name in emission) else []
+    if bpy.app.version >= (5, 2):
+        idle += [name for weight, names in _LOBES.items() if is_nothing(weight) for name in names]
+    return [socket for socket in place.node.inputs if socket.identifier in idle]  # by name, Blender finds not all

@@ -10,16 +10,14 @@ from pathlib import Path
 from typing import Literal
 from urllib.parse import quote
 
-import bpy
 import numpy as np
 
 from ..metric.errors import FileError
 from .headers import file_header
-from .images import CRASHES, crashes
+from .images import crashes
 
 _COUNT = re.compile(rb"-?0*\d{1,9}")  # Blender would end the process at 2^31
 _JPEG_2000 = (".jp2", ".j2k", ".j2c", ".jpc")
-_ASSET = re.compile("@([^@]+)@")  # in what USD says of a missing one, its name first, then that of who asks
 _PLY_BYTES = {
     **dict.fromkeys(("char", "uchar", "int8", "uint8"), 1),
     **dict.fromkeys(("short", "ushort", "int16", "uint16"), 2),
@@ -65,8 +63,8 @@ def _entries(folder: str) -> list[os.DirEntry[str]]:
 def _why_bad(entry: os.DirEntry[str]) -> str:
     """Why an importer must not load something; "" where it may."""
     if entry.is_file():
-        grey = entry.name.lower().endswith(_JPEG_2000) and crashes(file_header(entry.path))
-        return CRASHES if grey else ""
+        decoded = entry.name.lower().endswith(_JPEG_2000)  # while importing, the others later
+        return crashes(file_header(entry.path)) if decoded else ""
     return "" if entry.is_dir() else "a file is wanted, not a pipe or a device"
 
 
@@ -91,39 +89,6 @@ def check_alembic(path: str) -> tuple[str, ...]:
     if len(header) < 16 or root + 8 + 8 * children > size:
         raise FileError(f"{path}: the Alembic archive is truncated")
     return ()
-
-
-def check_usd(path: str) -> tuple[str, ...]:
-    """The faces of a USD file's meshes must have no more corners than are listed: Blender 4.5 reads beyond the end.
-
-    Returns:
-        The references, payloads and layers that are missing.
-
-    Raises:
-        FileError: they have.
-    """
-    try:
-        bpy.utils.expose_bundled_modules()
-        from pxr import Tf, Usd, UsdGeom
-    except ImportError:
-        return ()  # Debian's Blender 5 has no pxr, and survives such files
-    try:
-        stage = Usd.Stage.Open(path, Usd.Stage.LoadAll)
-    except Tf.ErrorException:
-        return ()  # the importer says what is wrong
-    for prim in stage.TraverseAll():
-        mesh = UsdGeom.Mesh(prim)
-        if not mesh:
-            continue
-        faces, corners = mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr()
-        for time in {Usd.TimeCode.Default(), *map(Usd.TimeCode, {*faces.GetTimeSamples(), *corners.GetTimeSamples()})}:
-            counts, listed = np.array(faces.Get(time) or [], np.int64), len(corners.Get(time) or [])
-            if counts.min(initial=0) < 0 or counts.sum() > listed:
-                raise FileError(
-                    f"{path}: a mesh's faces have {counts.sum()} corners, {listed} are listed; export it again"
-                )
-    asked = dict.fromkeys(name for error in stage.GetCompositionErrors() for name in _ASSET.findall(str(error))[:1])
-    return tuple(f"refers to {name}, which is missing or cannot be read" for name in asked)
 
 
 def check_ply(path: str) -> tuple[str, ...]:

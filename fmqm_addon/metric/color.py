@@ -304,6 +304,7 @@ class Texture:
             [0, 1] or bytes.
         unassociate: the pixels' color is multiplied by their alpha, and is divided by it after the interpolation.
         placement: where on the image a place lies.
+        solid: opaque everywhere, outside [0, 1] too.
     """
 
     pixels: NDArray[np.uint8] | NDArray[np.float32]
@@ -312,6 +313,7 @@ class Texture:
     linear: bool = False
     unassociate: bool = False
     placement: Placement = Placement()
+    solid: bool = False
 
     def lookup(self, values: Floats) -> Floats:
         """Equation (7): (N, 3) float64 colors in [0, 1] for (N, K) corner values.
@@ -338,6 +340,8 @@ class Texture:
         return color[:, :3]
 
     def _alpha(self, u: Floats, v: Floats) -> Floats:
+        if self.solid:
+            return np.ones(len(u))
         if self.pixels.shape[2] == 4:
             return self._interpolated(self.pixels[:, :, 3:], u, v)[:, 0]
         if self.extension == "clip":

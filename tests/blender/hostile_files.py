@@ -329,7 +329,7 @@ GLTF: dict[str, tuple[Any, Outcome]] = {
     ),
     "meshopt_required": (
         document(extensionsRequired=["EXT_meshopt_compression"], extensionsUsed=["EXT_meshopt_compression"]),
-        ("is not available", 1.0),
+        ("is not available on this addon version; export it without this compression", 1.0),
     ),
     "draco_of_noise": (
         document(
@@ -446,6 +446,30 @@ def usd(counts: str = "3", indices: str = "0,1,2", points: str = POINTS, more: s
     return "#usda 1.0\n" + MESH.format(counts=counts, indices=indices, points=points, more=more)
 
 
+SHARP = "int[] cornerIndices = [{}]\nfloat[] cornerSharpnesses = [1]"
+
+
+def shaders(count: int, last: str) -> str:
+    """A red triangle, whose roughness is an image by way of so many transforms."""
+    sources = [*(f"T{k}" for k in range(1, count)), last]
+    transforms = "".join(
+        f'def Shader "T{k}" {{\nuniform token info:id = "UsdTransform2d"\n'
+        f"float2 inputs:in.connect = </M/{source}.outputs:result>\nfloat2 outputs:result\n}}\n"
+        for k, source in enumerate(sources)
+    )
+    return (
+        usd(more="rel material:binding = </M>")
+        + '\ndef Material "M" {\ntoken outputs:surface.connect = </M/S.outputs:surface>\n'
+        'def Shader "S" {\nuniform token info:id = "UsdPreviewSurface"\n'
+        "color3f inputs:diffuseColor = (1,0,0)\nfloat inputs:roughness.connect = </M/I.outputs:r>\n"
+        "token outputs:surface\n}\n"
+        'def Shader "I" {\nuniform token info:id = "UsdUVTexture"\nasset inputs:file = @noise.png@\n'
+        "float2 inputs:st.connect = </M/T0.outputs:result>\nfloat outputs:r\n}\n"
+        'def Shader "Reader" {\nuniform token info:id = "UsdPrimvarReader_float2"\n'
+        'string inputs:varname = "st"\nfloat2 outputs:result\n}\n' + transforms + "}\n"
+    )
+
+
 USDA: dict[str, tuple[str, Outcome]] = {
     "no_default_prim": (usd(), 1.0),
     "index_beyond": (usd(indices="0,1,900"), "no faces"),
@@ -517,8 +541,32 @@ USDA: dict[str, tuple[str, Outcome]] = {
     "version_99": ("#usda 99.0\n", ("no mesh", "Could not open USD")),
     "curves": (
         '#usda 1.0\ndef BasisCurves "C" {\nint[] curveVertexCounts = [9]\npoint3f[] points = [(0,0,0)]\n}',
-        "no mesh",
+        "are listed",
     ),
+    "curves_of_negative_length": (
+        '#usda 1.0\ndef BasisCurves "C" {\nint[] curveVertexCounts = [-9, 9]\npoint3f[] points = [(0,0,0)]\n}',
+        "are listed",
+    ),
+    "sharp_corner": (usd(more=SHARP.format(2)), 1.0),
+    "sharp_corner_beyond": (usd(more=SHARP.format(3)), "has a sharp corner at 3"),
+    "sharp_corner_of_moving_points": (
+        usd(more=SHARP.format(2)).replace(f"points = [{POINTS}]", f"points.timeSamples = {{ 1: [{POINTS}] }}"),
+        1.0,
+    ),
+    "sharp_corner_beyond_at_a_time": (
+        usd(more=SHARP.format(2).replace("s = [2]", "s.timeSamples = { 1: [2], 5: [900000] }")),
+        "has a sharp corner at 900000",
+    ),
+    "instance_beyond_indices": (
+        '#usda 1.0\ndef "I" ( instanceable = true\nreferences = </Shape> ) {}\nclass "Shape" {\n'
+        + usd(counts="3, 3000000").partition("\n")[2]
+        + "\n}",
+        "are listed",
+    ),
+    "shader_in_itself": (shaders(1, "T0"), "in a row or a ring"),
+    "shaders_in_a_ring": (shaders(3, "T0"), "in a row or a ring"),
+    "shaders_in_a_row": (shaders(20, "Reader"), 1.0),
+    "shaders_in_a_long_row": (shaders(300, "Reader"), "in a row or a ring"),
     "sphere": ('#usda 1.0\ndef Sphere "S" {\ndouble radius = 1\n}', 1.0),
     "sphere_of_nan": ('#usda 1.0\ndef Cube "S" {\ndouble size = nan\n}', "not finite"),
     "deep": ("#usda 1.0\n" + 'def Xform "X" {\n' * 300 + usd().partition("\n")[2] + "\n}" * 300, 1.0),

@@ -26,6 +26,7 @@ from fmqm_addon.metric.surface import prepare_surface
 from . import scenes
 
 CLOSE = 1.5 / 255
+RED, GREEN = (0.9, 0.1, 0.1), (0.1, 0.9, 0.1)
 REASON = Unread("Noise Texture", "is not read")
 
 
@@ -314,6 +315,132 @@ def test_output_that_only_eevee_uses() -> None:
     object_ = scenes.square(materials=[material])
     seen = look_at(object_, baked(object_, 64)[0])
     assert np.abs(seen.color - of_gradient(seen.position)).max() < CLOSE
+
+
+def outputs_for(targets: tuple[str, str], active: int) -> bpy.types.Object:
+    """Red by the first output, green by the second."""
+    material = scenes.material()
+    tree = material.node_tree
+    outputs = [tree.get_output_node("ALL"), node(tree, "ShaderNodeOutputMaterial")]
+    for output, target, color in zip(outputs, targets, (RED, GREEN), strict=True):
+        tree.links.new(shader(tree, "ShaderNodeBsdfDiffuse", color).outputs[0], output.inputs["Surface"])
+        output.target = target
+    for number, output in enumerate(outputs):
+        output.is_active_output = number == active
+    return scenes.square(materials=[material])
+
+
+@pytest.mark.parametrize("active", [0, 1])
+@pytest.mark.parametrize(
+    ("targets", "shown"),
+    [(("ALL", "CYCLES"), 1), (("CYCLES", "EEVEE"), 0), (("ALL", "EEVEE"), 0), (("ALL", "ALL"), -1)],
+)
+def test_of_several_outputs_that_of_cycles(targets: tuple[str, str], shown: int, active: int) -> None:
+    """Else the active one."""
+    object_ = outputs_for(targets, active)
+    wanted = (RED, GREEN)[active if shown < 0 else shown]
+    assert np.abs(look_at(object_, baked(object_, 32)[0]).color - encode_srgb(wanted)).max() < CLOSE
+
+
+@pytest.mark.parametrize("where", ["Base Color", "Alpha", "factor"])
+def test_muted_links_count_for_nothing(where: str) -> None:
+    """Neither do they into a black base color, beside which a shader's emission is all that is seen."""
+    material = scenes.material(color=(0, 0, 0))
+    tree = material.node_tree
+    principled = scenes.base_color(material).node
+    principled.inputs["Emission Color"].default_value = (0.2, 0.4, 0.6, 1)
+    principled.inputs["Emission Strength"].default_value = 1
+    half = mix(tree, 0.5, principled, shader(tree, "ShaderNodeBsdfGlossy", (0.4, 0.2, 0)))
+    tree.links.new(half, surface(material))
+    link = tree.links.new(gradient(tree), half.node.inputs[0] if where == "factor" else principled.inputs[where])
+    link.is_muted = True
+    object_ = scenes.square(materials=[material])
+    seen = look_at(object_, baked(object_, 32)[0])
+    assert np.abs(seen.color - encode_srgb([0.3, 0.3, 0.3])).max() < CLOSE and (seen.opacity == 1).all()
+
+
+@pytest.mark.parametrize("grouped", [False, True])
+@pytest.mark.parametrize(
+    ("kind", "domain"), [("FLOAT2", "CORNER"), ("FLOAT", "POINT"), ("INT", "FACE"), ("BOOLEAN", "POINT")]
+)
+def test_color_attribute_node_that_names_a_number(kind: str, domain: str, grouped: bool) -> None:
+    """As the geometry nodes of a mask make it, or a UV map's name: Cycles itself would crash. Shown as EEVEE does."""
+    object_ = scenes.square(materials=[scenes.material()])
+    made = object_.data.attributes.new("Mask", kind, domain)
+    for each in made.data:
+        setattr(each, "vector" if kind == "FLOAT2" else "value", (0.5, 0.25) if kind == "FLOAT2" else 1)
+    tree = object_.data.materials[0].node_tree
+    inner = tree
+    target = scenes.base_color(object_.data.materials[0])
+    if grouped:
+        inner = bpy.data.node_groups.new("Group", "ShaderNodeTree")
+        inner.interface.new_socket("Color", in_out="OUTPUT", socket_type="NodeSocketColor")
+        tree.links.new(node(tree, "ShaderNodeGroup", node_tree=inner).outputs[0], target)
+        target = node(inner, "NodeGroupOutput").inputs[0]
+    inner.links.new(node(inner, "ShaderNodeVertexColor", layer_name="Mask").outputs["Color"], target)
+    wanted = (0.5, 0.25, 0) if kind == "FLOAT2" else (1, 1, 1)
+    assert np.abs(look_at(object_, baked(object_, 32)[0]).color - encode_srgb(wanted)).max() < CLOSE
+
+
+def test_number_that_is_the_default_color() -> None:
+    material = scenes.material()
+    tree = material.node_tree
+    tree.links.new(node(tree, "ShaderNodeVertexColor").outputs["Color"], scenes.base_color(material))
+    object_ = scenes.square(materials=[material])
+    object_.data.attributes.new("Mask", "FLOAT", "POINT")
+    object_.data.attributes.default_color_name = "Mask"
+    assert (look_at(object_, baked(object_, 32)[0]).color == 0).all()
+
+
+@pytest.mark.parametrize("value", [(0.8, 0.3, 0.1), 0.25, 1])
+@pytest.mark.parametrize("kind", ["OBJECT", "mesh", "modified mesh", "INSTANCER", "VIEW_LAYER", "scene"])
+def test_custom_properties(kind: str, value: float | tuple[float, ...]) -> None:
+    object_ = scenes.square(materials=[scenes.material()])
+    tree = object_.data.materials[0].node_tree
+    if kind == "modified mesh":
+        refine(object_)
+    at = "mesh" if "mesh" in kind else kind
+    of = {"mesh": object_.data, "VIEW_LAYER": bpy.context.view_layer, "scene": bpy.context.scene}.get(at, object_)
+    of["tint"] = value
+    of["idle"] = {"a": "not a number"}
+    tint = node(tree, "ShaderNodeAttribute", attribute_name="tint")
+    tint.attribute_type = {"mesh": "OBJECT", "scene": "VIEW_LAYER"}.get(at, at)
+    tree.links.new(tint.outputs["Color"], scenes.base_color(object_.data.materials[0]))
+    wanted = encode_srgb(np.broadcast_to(value, 3).astype(float))
+    assert np.abs(look_at(object_, baked(object_, 32)[0]).color - wanted).max() < CLOSE
+
+
+def test_no_uv_map_but_pairs_of_numbers_on_faces() -> None:
+    """As USD's uniform primvars come: they are a UV map in no way but their type."""
+    object_ = scenes.cube(uv=False, materials=[procedural()])
+    object_.data.attributes.new("st", "FLOAT2", "FACE")
+    seen = look_at(object_, baked(object_, 64)[0])
+    assert np.abs(seen.color - of_gradient(seen.position)).max() < CLOSE
+
+
+def test_link_that_ends_in_nothing() -> None:
+    """Since Blender 5.2 the value of the shader's own input counts."""
+    material = scenes.material(color=(0.4, 0.2, 0.6))
+    tree = material.node_tree
+    tree.links.new(node(tree, "NodeReroute").outputs[0], scenes.base_color(material))
+    black = shader(tree, "ShaderNodeBsdfGlossy", (0, 0, 0))
+    tree.links.new(mix(tree, 0.5, scenes.base_color(material).node, black), surface(material))
+    object_ = scenes.square(materials=[material])
+    wanted = encode_srgb([0.2, 0.1, 0.3] if bpy.app.version >= (5, 2) else [0, 0, 0])
+    assert np.abs(look_at(object_, baked(object_, 32)[0]).color - wanted).max() < CLOSE
+
+
+def test_alpha_above_one_is_one() -> None:
+    """Also to the mix that it goes into."""
+    material = procedural()
+    tree = material.node_tree
+    principled = scenes.base_color(material).node
+    bright = node(tree, "ShaderNodeValue")
+    bright.outputs[0].default_value = 1.5
+    tree.links.new(bright.outputs[0], principled.inputs["Alpha"])
+    tree.links.new(mix(tree, 0.4, shader(tree, "ShaderNodeBsdfTransparent"), principled), surface(material))
+    object_ = scenes.square(materials=[material])
+    assert look_at(object_, baked(object_, 32)[0]).opacity == pytest.approx(0.4, abs=CLOSE)
 
 
 def test_alpha_of_the_shader() -> None:
@@ -641,6 +768,17 @@ def test_plain_color_where_baking_is_impossible(size: int, monkeypatch: pytest.M
     (warning,) = arrays.warnings
     assert "material Rust: Texture Coordinate is not read" in warning and "plain color" in warning
     assert ("the baker is ill" in warning) is (size > 0)
+
+
+def test_plain_color_of_the_first_shader_that_has_one() -> None:
+    material = scenes.material()
+    tree = material.node_tree
+    red, green = (shader(tree, f"ShaderNodeBsdf{kind}", color) for kind, color in (("Diffuse", RED), ("Glossy", GREEN)))
+    both = mix(tree, 0.5, red, green)
+    tree.links.new(mix(tree, 0.5, shader(tree, "ShaderNodeBsdfTransparent"), both.node), surface(material))
+    arrays = mesh_arrays([scenes.cube("Crate", materials=[material])], "asset", Reading(bake=0))
+    assert arrays.materials[0].color.lookup(np.zeros((1, 2)))[0] == pytest.approx(encode_srgb(RED))
+    assert "its plain color is taken" in arrays.warnings[0]
 
 
 def test_missing_images_are_no_secret_of_the_baker(tmp_path: Path) -> None:

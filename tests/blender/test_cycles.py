@@ -141,6 +141,15 @@ def bake(
     return values.reshape(SIDE, SIDE, 4)[:, :, :3].astype(float)
 
 
+def emitted(scene: Scene) -> np.ndarray:
+    """(SIDE, SIDE, 3) linear light that the material emits as it is."""
+    target = bpy.data.images.new("target", SIDE, SIDE, float_buffer=True, is_data=True)
+    scene.tree.nodes.active = scene.node("TexImage", image=target)
+    with cycles(scene.object):
+        bpy.ops.object.bake(type="EMIT", margin=0)
+    return np.array(target.pixels).reshape(SIDE, SIDE, 4)[:, :, :3]
+
+
 def seen(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
     """(SIDE, SIDE, 3) colors and (SIDE, SIDE) opacities at the same places of the square."""
     number = np.arange(SIDE)
@@ -548,6 +557,7 @@ def test_float_with_alpha(scene: Scene, mode: str, space: str, alpha: bool, pack
     [
         (4, np.uint8, "PREMUL", False),
         (2, np.uint8, "STRAIGHT", False),
+        (2, np.uint16, "STRAIGHT", False),
         (4, np.uint16, "STRAIGHT", True),
         (4, np.float32, "STRAIGHT", False),
     ],
@@ -560,7 +570,37 @@ def test_alpha_that_blenders_treat_differently_is_left_to_the_baker(
         node.image.pack()
     scene.link(node.outputs["Color"], scene.shader().inputs["Base Color"])
     look = read_look(scene.material, TextureCache(), Reading())
-    assert isinstance(look, Unread) and "alpha" in look.why
+    assert isinstance(look, Unread) and "unusual" in look.why
+
+
+@pytest.mark.parametrize(
+    ("kind", "space"), [(np.uint16, "ACEScg"), (np.uint16, "Linear Rec.2020"), (np.float32, "sRGB")]
+)
+@pytest.mark.parametrize("packed", [False, True])
+def test_files_that_cycles_decodes_by_itself(scene: Scene, kind: type, space: str, packed: bool) -> None:
+    """It does so after the interpolation, and not as Blender does; what is packed it has from Blender."""
+    node = scene.image(noise(3, kind), space)
+    scene.link(node.outputs["Color"], scene.shader().inputs["Base Color"])
+    assert isinstance(read_look(scene.material, TextureCache(), Reading()), Unread)
+    if packed:
+        node.image.pack()
+        check(scene)
+
+
+@pytest.mark.parametrize("channels", [1, 2, 3, 4])
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+@pytest.mark.parametrize("mode", ["STRAIGHT", "CHANNEL_PACKED"])
+@pytest.mark.parametrize("packed", [False, True])
+def test_decal(scene: Scene, channels: int, kind: type, mode: str, packed: bool) -> None:
+    """Outside, what has no alpha of its own is transparent too, unless it is a file with a single channel."""
+    pixels = noise(channels, kind)
+    if channels in (2, 4):
+        pixels[:, :, -1] = np.iinfo(kind).max
+    node = scene.image(pixels, mode=mode)
+    if packed:
+        node.image.pack()
+    node.extension = "CLIP"
+    finish(scene, (node.outputs["Color"], node.outputs["Alpha"]))
 
 
 @pytest.mark.parametrize("alpha", [False, True])
@@ -704,6 +744,93 @@ def test_alpha_that_is_used_elsewhere(scene: Scene, name: str) -> None:
     np.testing.assert_allclose(seen(scene.surface())[0], wanted, rtol=0, atol=TOLERANCE)
 
 
+def on_tube(scene: Scene, node: bpy.types.Node) -> bpy.types.Node:
+    node.projection = "TUBE"
+    scene.link(scene.node("TexCoord").outputs["Object"], node.inputs["Vector"])
+    return node
+
+
+def on_constant(scene: Scene, node: bpy.types.Node) -> bpy.types.Node:
+    vector = scene.node("CombineXYZ")
+    vector.inputs["X"].default_value = vector.inputs["Y"].default_value = 0.4
+    scene.link(vector.outputs[0], node.inputs["Vector"])
+    return node
+
+
+def enclosed(scene: Scene, node: bpy.types.Node) -> bpy.types.Node:
+    """The node in a group that has its outputs."""
+    group = bpy.data.node_groups.new("Group", "ShaderNodeTree")
+    end, inner = group.nodes.new("NodeGroupOutput"), group.nodes.new("ShaderNodeTexImage")
+    inner.image, inner.projection = node.image, "SPHERE"
+    for output in inner.outputs:
+        group.interface.new_socket(output.name, in_out="OUTPUT", socket_type=output.bl_idname)
+    for output, socket in zip(inner.outputs, end.inputs, strict=False):
+        group.links.new(output, socket)
+    return scene.node("Group", node_tree=group)
+
+
+@pytest.mark.parametrize("prepare", [on_tube, on_constant, enclosed])
+@pytest.mark.parametrize("name", ["times one", "times zero", "volume"])
+def test_alpha_that_is_used_beside_what_is_baked(
+    scene: Scene, prepare: Callable[[Scene, bpy.types.Node], bpy.types.Node], name: str
+) -> None:
+    """Only the color is baked; what the alpha is used for is not."""
+    node = scene.image(noise(4))
+    node.interpolation = "Closest"
+    node = prepare(scene, node)
+    output = scene.tree.get_output_node("ALL")
+    scene.link(node.outputs["Color"], scene.shader().inputs["Base Color"])
+    USES[name](scene, node.outputs["Alpha"])
+    surface = scene.surface()
+    assert [each.how for each in surface.materials] == ["baked"]
+    wanted = encode_srgb(bake(scene, node.outputs["Color"], source(output.inputs["Surface"])))
+    same = (np.abs(seen(surface)[0] - wanted) < TOLERANCE).all(axis=2)
+    assert same.mean() > 0.9  # all but where one pixel ends
+
+
+@pytest.mark.parametrize("how", ["read", "baked"])
+def test_alpha_that_is_a_color_on_its_way(scene: Scene, how: str) -> None:
+    node = scene.image(noise(4))
+    if how == "baked":
+        node = on_constant(scene, node)
+    group = bpy.data.node_groups.new("Group", "ShaderNodeTree")
+    for way in ("INPUT", "OUTPUT"):
+        group.interface.new_socket("Color", in_out=way, socket_type="NodeSocketColor")
+    start, end = group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
+    group.links.new(start.outputs[0], end.inputs[0])
+    passed = scene.node("Group", node_tree=group)
+    scene.link(node.outputs["Alpha"], passed.inputs[0])
+    scene.link(passed.outputs[0], scene.shader().inputs["Alpha" if how == "baked" else "Roughness"])
+    scene.link(node.outputs["Color"], scene.shader().inputs["Base Color"])
+    surface = scene.surface()
+    assert [each.how for each in surface.materials] == [how]
+    wanted = encode_srgb(bake(scene, node.outputs["Color"], node.outputs["Alpha"]))
+    np.testing.assert_allclose(seen(surface)[0], wanted, rtol=0, atol=TOLERANCE)
+
+
+LOBES = ("Subsurface Weight", "Coat Weight", "Sheen Weight", "Anisotropic", "Thin Film Thickness", "Emission Strength")
+FED = (
+    "Metallic", "Roughness", "IOR", "Normal", "Diffuse Roughness", "Subsurface Radius", "Subsurface Scale",
+    "Subsurface Anisotropy", "Specular IOR Level", "Specular Tint", "Anisotropic Rotation", "Tangent",
+    "Transmission Weight", "Coat Roughness", "Coat IOR", "Coat Tint", "Coat Normal", "Sheen Roughness", "Sheen Tint",
+    "Thin Film IOR", *LOBES,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("weight", [0.0, 0.3])
+@pytest.mark.parametrize("name", FED)
+def test_alpha_in_an_input_of_the_shader(scene: Scene, name: str, weight: float) -> None:
+    """Cycles takes it for unused where its lobe has no weight."""
+    node, shader, output = scene.image(noise(4)), scene.shader(), scene.tree.get_output_node("ALL")
+    for lobe in LOBES:
+        shader.inputs[lobe].default_value = weight
+    shader.inputs["Emission Color"].default_value = (0, 0, 0, 1)
+    scene.link(node.outputs["Color"], shader.inputs["Base Color"])
+    scene.link(node.outputs["Alpha"], shader.inputs[name])
+    wanted = encode_srgb(bake(scene, node.outputs["Color"], source(output.inputs["Surface"])))
+    np.testing.assert_allclose(seen(scene.surface())[0], wanted, rtol=0, atol=TOLERANCE)
+
+
 @pytest.mark.parametrize("blend", ["MIX", "MULTIPLY"])
 @pytest.mark.parametrize("factor", [0.0, 0.37, 1.0, 1.6])
 @pytest.mark.parametrize("clamps", [(False, False), (True, True), (False, True)])
@@ -744,6 +871,78 @@ def test_unlit(scene: Scene, see_through: bool) -> None:
     np.testing.assert_allclose(opacity, wanted, rtol=0, atol=TOLERANCE)
 
 
+def grouped(scene: Scene, kind: str, links: bool = True) -> bpy.types.Node:
+    """A group that hands on one value of a kind of socket; or that has a reroute before its output, fed by nothing."""
+    tree = bpy.data.node_groups.new("group", "ShaderNodeTree")
+    for way in ("INPUT", "OUTPUT"):
+        tree.interface.new_socket("Value", in_out=way, socket_type=kind)
+    start = tree.nodes.new("NodeGroupInput" if links else "NodeReroute")
+    output = tree.nodes.new("NodeGroupOutput")
+    tree.links.new(start.outputs[0], output.inputs[0])
+    if not links:
+        output.inputs[0].default_value = (0.5, 0.1, 0.4, 1)
+    return scene.node("Group", node_tree=tree)
+
+
+def empty_reroute(scene: Scene) -> bpy.types.NodeSocket:
+    return scene.tree.nodes.new("NodeReroute").outputs[0]
+
+
+def muted(scene: Scene, start: bpy.types.NodeSocket | None = None) -> bpy.types.NodeSocket:
+    gamma = scene.node("Gamma", mute=True)
+    gamma.inputs["Color"].default_value = (0.2, 0.4, 0.6, 1)
+    if start is not None:
+        scene.link(start, gamma.inputs["Color"])
+    return gamma.outputs[0]
+
+
+def rerouted(scene: Scene, start: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+    reroute = scene.tree.nodes.new("NodeReroute")
+    scene.link(start, reroute.inputs[0])
+    return reroute.outputs[0]
+
+
+def into_group(scene: Scene, start: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+    group = grouped(scene, "NodeSocketColor")
+    group.inputs[0].default_value = (0.7, 0.2, 0.3, 1)
+    scene.link(start, group.inputs[0])
+    return group.outputs[0]
+
+
+ENDS: dict[str, Callable[[Scene], bpy.types.NodeSocket]] = {
+    "reroute": empty_reroute,
+    "muted node": muted,
+    "muted node after a reroute": lambda scene: muted(scene, empty_reroute(scene)),
+    "reroute after a muted node": lambda scene: rerouted(scene, muted(scene)),
+    "muted node without a way through": lambda scene: scene.node("RGB", mute=True).outputs[0],
+    "reroute in a group": lambda scene: grouped(scene, "NodeSocketColor", links=False).outputs[0],
+    "reroute before a group": lambda scene: into_group(scene, empty_reroute(scene)),
+    "muted node before a group": lambda scene: into_group(scene, muted(scene)),
+}
+
+
+@pytest.mark.parametrize("name", ENDS)
+def test_link_that_ends_in_nothing(scene: Scene, name: str) -> None:
+    """Blenders do not agree on whose own value counts then."""
+    emission = scene.node("Emission")
+    emission.inputs["Color"].default_value = (0.1, 0.9, 0.3, 1)
+    scene.link(ENDS[name](scene), emission.inputs["Color"])
+    scene.link(emission.outputs[0], scene.tree.get_output_node("ALL").inputs["Surface"])
+    shown, _ = seen(scene.surface())
+    np.testing.assert_allclose(shown, encode_srgb(emitted(scene)), rtol=0, atol=TOLERANCE)
+
+
+@pytest.mark.parametrize("kind", ["NodeSocketInt", "NodeSocketBool", "NodeSocketFloat"])
+def test_alpha_through_a_group_of_whole_numbers(scene: Scene, kind: str) -> None:
+    """Which round what they are given before Blender 5.2."""
+    group, shader = grouped(scene, kind), scene.shader()
+    scene.link(scene.image(noise(4)).outputs["Alpha"], group.inputs[0])
+    scene.link(group.outputs[0], shader.inputs["Alpha"])
+    _, opacity = seen(prepare_surface(mesh_arrays([scene.object], "asset", Reading(bake=4096)), BVHQuery))
+    wanted = bake(scene, group.outputs[0], None, as_number=True)[:, :, 0]
+    np.testing.assert_allclose(opacity, wanted, rtol=0, atol=2 * TOLERANCE)
+
+
 @pytest.mark.parametrize("strength", [1.0, 0.4, 3.0])
 def test_emission(scene: Scene, strength: float) -> None:
     """Baked as it is, strength and all."""
@@ -752,29 +951,22 @@ def test_emission(scene: Scene, strength: float) -> None:
     scene.link(scene.image().outputs["Color"], emission.inputs["Color"])
     scene.link(emission.outputs[0], output.inputs["Surface"])
     shown, _ = seen(scene.surface())
-    target = bpy.data.images.new("target", SIDE, SIDE, float_buffer=True, is_data=True)
-    scene.tree.nodes.active = scene.node("TexImage", image=target)
-    with cycles(scene.object):
-        bpy.ops.object.bake(type="EMIT", margin=0)
-    wanted = np.array(target.pixels).reshape(SIDE, SIDE, 4)[:, :, :3]
-    np.testing.assert_allclose(shown, encode_srgb(wanted), rtol=0, atol=TOLERANCE)
+    np.testing.assert_allclose(shown, encode_srgb(emitted(scene)), rtol=0, atol=TOLERANCE)
 
 
+@pytest.mark.parametrize("muted", [False, True])
 @pytest.mark.parametrize("strength", [1.0, 0.4])
-def test_principled_that_only_shines(scene: Scene, strength: float) -> None:
-    """Its base color is plain black: its emission is what the artist sees."""
+def test_principled_that_only_shines(scene: Scene, strength: float, muted: bool) -> None:
+    """Its base color is plain black, as a muted link leaves it: its emission is what the artist sees."""
     shader = scene.shader()
     shader.inputs["Base Color"].default_value = (0, 0, 0, 1)
     shader.inputs["Emission Strength"].default_value = strength
     scene.link(scene.image().outputs["Color"], shader.inputs["Emission Color"])
+    if muted:
+        scene.tree.links.new(scene.node("VertexColor").outputs["Color"], shader.inputs["Base Color"]).is_muted = True
     surface = scene.surface()
     shown, _ = seen(surface)
-    target = bpy.data.images.new("target", SIDE, SIDE, float_buffer=True, is_data=True)
-    scene.tree.nodes.active = scene.node("TexImage", image=target)
-    with cycles(scene.object):
-        bpy.ops.object.bake(type="EMIT", margin=0)
-    wanted = np.array(target.pixels).reshape(SIDE, SIDE, 4)[:, :, :3]
-    np.testing.assert_allclose(shown, encode_srgb(wanted), rtol=0, atol=TOLERANCE)
+    np.testing.assert_allclose(shown, encode_srgb(emitted(scene)), rtol=0, atol=TOLERANCE)
     assert [image.role for image in surface.materials[0].images] == ["base color"]
 
 
@@ -811,6 +1003,38 @@ def test_mixed_with_transparent(scene: Scene, first: str, varies: bool) -> None:
     np.testing.assert_allclose(shown, wanted, rtol=0, atol=TOLERANCE)
     factor = bake(scene, alpha, None, as_number=True)[:, :, 0] if varies else np.full_like(opacity, 0.3)
     np.testing.assert_allclose(opacity, factor if first == "transparent" else 1 - factor, rtol=0, atol=TOLERANCE)
+
+
+@pytest.mark.parametrize("first", ["transparent", "principled"])
+def test_what_a_transparent_shader_covers_has_a_color(scene: Scene, first: str) -> None:
+    """As where it is baked; the factor is a node's."""
+    mix, shader, factor = scene.node("MixShader"), scene.shader(), scene.node("Value")
+    shader.inputs["Base Color"].default_value = (0.1, 0.6, 0.2, 1)
+    sides = [scene.node("BsdfTransparent").outputs[0], shader.outputs[0]]
+    for number, side in enumerate(sides if first == "transparent" else sides[::-1], 1):
+        scene.link(side, mix.inputs[number])
+    factor.outputs[0].default_value = 0 if first == "transparent" else 1
+    scene.link(factor.outputs[0], mix.inputs[0])
+    scene.link(mix.outputs[0], scene.tree.get_output_node("ALL").inputs["Surface"])
+    shown, opacity = seen(scene.surface())
+    np.testing.assert_allclose(shown[0, 0], encode_srgb(np.array([0.1, 0.6, 0.2])), rtol=0, atol=TOLERANCE)
+    assert (opacity == 0).all()
+
+
+def test_alpha_above_one_in_a_mix(scene: Scene) -> None:
+    """Counts as one, as a render shows: the mix has the factor's share of what is opaque."""
+    mix, shader, double = scene.node("MixShader"), scene.shader(), scene.node("Math", operation="MULTIPLY")
+    double.inputs[1].default_value = 2
+    scene.link(scene.image(noise(4)).outputs["Alpha"], double.inputs[0])
+    scene.link(double.outputs[0], shader.inputs["Alpha"])
+    mix.inputs[0].default_value = 0.4
+    scene.link(scene.node("BsdfTransparent").outputs[0], mix.inputs[1])
+    scene.link(shader.outputs[0], mix.inputs[2])
+    scene.link(mix.outputs[0], scene.tree.get_output_node("ALL").inputs["Surface"])
+    _, opacity = seen(scene.surface())
+    wanted = np.clip(bake(scene, double.outputs[0], None, as_number=True)[:, :, 0], 0, 1) * 0.4
+    np.testing.assert_allclose(opacity, wanted, rtol=0, atol=TOLERANCE)
+    assert opacity.max() == pytest.approx(0.4)
 
 
 USD = """#usda 1.0

@@ -141,3 +141,16 @@ def test_images_and_uvs(tmp_path: Path, size: tuple[int, int], uv: float) -> Non
     with np.errstate(all="ignore"):
         object_ = build(grid(), scenes.write_png(tmp_path / "image.png", pixels), uv)
     assert self_scores(object_) == [1.0] * 5
+
+
+@pytest.mark.parametrize(
+    ("collection", "name", "value"),
+    [("loops", "vertex_index", -7), ("loops", "vertex_index", 5000), ("polygons", "loop_start", 10**8)],
+)
+def test_corrupt_faces_are_refused(collection: str, name: str, value: int) -> None:
+    """Blender trusts its meshes, and would end the process."""
+    square = scenes.square()
+    items = getattr(square.data, collection)
+    items.foreach_set(name, [value] * len(items))
+    with pytest.raises(MeshError, match="its faces name corners or vertices that it has not"):
+        self_scores(square)

@@ -100,6 +100,12 @@ def test_nothing_stays_in_the_session(monkeys: Path, kind: str) -> None:
     assert scenes.blocks() == before
 
 
+def test_images_in_an_archive_are_named_by_it(monkeys: Path) -> None:
+    """Not by the folder, with a name by chance, where the importer unpacks them."""
+    (image,) = load_mesh(str(monkeys / "monkey.usdz")).materials[0].images
+    assert image.path == str(monkeys / "monkey.usdz" / "image.png")
+
+
 def test_paths_with_spaces_and_other_letters(monkeys: Path, tmp_path: Path) -> None:
     folder = tmp_path / "mit Leerzeichen, Grüße"
     shutil.copytree(monkeys, folder)

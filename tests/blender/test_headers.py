@@ -92,6 +92,15 @@ def test_size_of_a_jpeg_behind_a_thumbnail_of_another_size(tmp_path: Path) -> No
     assert read_header(io.BytesIO(wrapped)) == Header(37, 21)
 
 
+@pytest.mark.parametrize(("start", "length", "cut"), [(520, 3, False), (520, 4, True), (2**32 - 1, 9, True)])
+def test_rows_of_a_packed_sgi(start: int, length: int, cut: bool) -> None:
+    header = struct.pack(">HBBHHHH", 474, 1, 1, 3, 3, 1, 1).ljust(512, b"\0")
+    data = header + struct.pack(">II", start, length) + bytes(3)
+    assert read_header(io.BytesIO(data)) == Header(3, 1, is_cut=cut)
+    assert read_header(io.BytesIO(data[:515])) == Header(3, 1, is_cut=True)
+    assert read_header(io.BytesIO(data[:2] + b"\0" + data[3:])) == Header(3, 1)  # not packed
+
+
 def test_what_is_not_there_promises_nothing(tmp_path: Path) -> None:
     assert file_header(str(tmp_path / "none.png")) is None
     assert file_header(str(tmp_path)) is None

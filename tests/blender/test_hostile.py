@@ -7,6 +7,7 @@ import json
 import os
 import re
 import shutil
+import struct
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -247,6 +248,35 @@ def test_image_at_which_an_importer_crashes(tmp_path: Path, unharmed: None) -> N
     pillow.new("LA", (24, 20)).save(tmp_path / "grey.jp2")
     path = write_torus(tmp_path, "ring", "grey.jp2")
     assert "crashes at a JPEG 2000" in str(outcome(path))
+
+
+@pytest.mark.parametrize("rows", [b"", b"\xff" * 8, struct.pack(">II", 520, 3)], ids=["none", "huge", "short"])
+def test_packed_sgi_image_whose_rows_are_elsewhere(tmp_path: Path, unharmed: None, rows: bytes) -> None:
+    """Blender 5.2 would end the process."""
+    header = struct.pack(">HBBHHHH", 474, 1, 1, 3, 3, 1, len(rows) // 8)
+    (tmp_path / "image.sgi").write_bytes(header.ljust(512, b"\0") + rows)
+    path = write_torus(tmp_path, "ring", "image.sgi")
+    assert "image.sgi: the image is broken, its rows are not where it says" in str(outcome(path))
+
+
+def test_collections_that_multiply(tmp_path: Path, unharmed: None) -> None:
+    """Each instances the next ten times: refused before Blender unfolds them."""
+    scenes.clear()
+    held = bpy.data.collections.new("0")
+    scenes.cube(collection=held)
+    for level in range(1, 8):
+        outer = bpy.data.collections.new(str(level))
+        for number in range(10):
+            made = bpy.data.objects.new(f"{level} {number}", None)
+            made.instance_type, made.instance_collection = "COLLECTION", held
+            outer.objects.link(made)
+        held = outer
+    bpy.context.scene.collection.children.link(held)
+    path = scenes.export(tmp_path, "blend")
+    scenes.clear()
+    assert outcome(path) == (
+        f"{path}: its collections show 21,111,100 objects by instancing each other; at most 1,000,000 are measured"
+    )
 
 
 @pytest.mark.parametrize("name", ["two\nlines", "tab\t%s{0}", "\u202e\U0001f480", "-dash", "x" * 240, "a:b", " "])

@@ -58,7 +58,7 @@ def test_eight_bit_images_keep_their_values(tmp_path: Path) -> None:
     for space, linear in (("sRGB", False), ("Non-Color", True)):
         image.colorspace_settings.name = space
         pixels = read_pixels(image)
-        assert np.array_equal(pixels.values, ramp) and pixels.linear == linear and not pixels.associated
+        assert np.array_equal(pixels.values, ramp) and pixels.linear == linear and not pixels.unusual
 
 
 def test_alpha_multiplies_as_cycles_does_by_mode(tmp_path: Path) -> None:

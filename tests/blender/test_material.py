@@ -209,6 +209,17 @@ def test_vectors_that_are_not_read_are_left_to_the_baker(tmp_path: Path) -> None
         assert isinstance(read_look(material, TextureCache(), Reading()), Unread), output
 
 
+def test_the_number_of_an_attribute_is_no_vector(tmp_path: Path) -> None:
+    """Though its name may be a UV map's."""
+    material = scenes.material()
+    node = scenes.image_node(material, loaded(tmp_path, scenes.noise()))
+    attribute = material.node_tree.nodes.new("ShaderNodeAttribute")
+    attribute.attribute_name = "UVMap"
+    for output, found in zip(attribute.outputs, (Look, Look, Unread, Unread), strict=True):  # the last two are numbers
+        material.node_tree.links.new(output, node.inputs["Vector"])
+        assert isinstance(read_look(material, TextureCache(), Reading()), found), output.name
+
+
 def test_a_mix_by_a_factor_that_varies_is_left_to_the_baker(tmp_path: Path) -> None:
     material = scenes.material()
     node = scenes.image_node(material, loaded(tmp_path, scenes.noise()), link=False)
@@ -284,6 +295,33 @@ def test_missing_alpha_image_is_opaque(tmp_path: Path) -> None:
         seen = look(material)
         assert seen.material.alpha is None
         assert [(image.role, image.missing) for image in seen.material.images] == [("alpha", True)]
+
+
+@pytest.mark.parametrize("output", ["Alpha", "Color"])
+@pytest.mark.parametrize("flipped", [False, True])
+def test_missing_image_between_a_shader_and_a_transparent_one_is_opaque(
+    tmp_path: Path, output: str, flipped: bool
+) -> None:
+    material = scenes.material(color=(0.5, 0.5, 0.5))
+    tree, path = material.node_tree, scenes.write_png(tmp_path / "alpha.png", scenes.noise())
+    node = scenes.image_node(material, bpy.data.images.load(str(path)), link=False)
+    path.unlink()
+    mix, transparent = tree.nodes.new("ShaderNodeMixShader"), tree.nodes.new("ShaderNodeBsdfTransparent")
+    tree.links.new(node.outputs[output], mix.inputs[0])
+    tree.links.new(transparent.outputs[0], mix.inputs[2 if flipped else 1])
+    tree.links.new(scenes.base_color(material).node.outputs[0], mix.inputs[1 if flipped else 2])
+    tree.links.new(mix.outputs[0], tree.get_output_node("ALL").inputs["Surface"])
+    seen = look(material)
+    assert seen.material.alpha is None and seen.material.color.rgb == pytest.approx((ENCODED[0.5],) * 3, abs=1e-5)
+    assert [(image.role, image.missing) for image in seen.material.images] == [("alpha", True)]
+
+
+def test_attribute_without_a_name_is_black_with_a_warning() -> None:
+    material = scenes.material("Bare")
+    behind(material, "Attribute")
+    seen = look(material)
+    assert seen.material.color.rgb == (0, 0, 0) and seen.layers == ()
+    assert seen.warnings == ("material Bare: Attribute names no attribute; it is black, as Blender renders it",)
 
 
 def test_plain_look_is_the_shader_s_own_color(tmp_path: Path) -> None:
@@ -383,7 +421,7 @@ def test_image_that_cannot_be_read_is_an_error_that_names_its_path(tmp_path: Pat
     with pytest.raises(MeshError) as caught:
         look(material)
     text = str(caught.value)
-    assert str(path) in text and "--texture" in text and "\n" not in text
+    assert str(path) in text and "repair it" in text and "\n" not in text
     assert ("missing" in text) == (how == "missing")
 
 

@@ -16,6 +16,7 @@ from fmqm_addon.blender.bvh import BVHQuery
 from fmqm_addon.blender.images import TextureCache
 from fmqm_addon.blender.looks import Reading
 from fmqm_addon.blender.mesh import mesh_arrays, to_bake
+from fmqm_addon.blender.plain import make_plain
 from fmqm_addon.metric.color import Texture
 from fmqm_addon.metric.errors import MeshError
 from fmqm_addon.metric.surface import prepare_surface
@@ -146,6 +147,18 @@ def test_material_linked_to_the_object_wins() -> None:
     object_.material_slots[0].material = scenes.material("Object", (0, 0, 1))
     color = mesh_arrays([object_], "asset").materials[0].color
     assert color.rgb == pytest.approx((0, 0, 1))
+
+
+def test_slot_that_is_linked_to_the_object_and_empty_there() -> None:
+    """Since Blender 5.2 renders show no material, and older ones the mesh's, which both tell that they show."""
+    object_ = scenes.square(materials=[scenes.material("Data", (1, 0, 0))])
+    object_.material_slots[0].link = "OBJECT"
+    is_old = bpy.app.version < (5, 2)
+    arrays = mesh_arrays([object_], "asset")
+    assert arrays.materials[0].how == ("read" if is_old else "none") and bool(arrays.warnings) != is_old
+    make_plain([object_], alone=True)
+    (plain,) = bpy.data.objects
+    assert [slot.material and slot.material.name for slot in plain.material_slots] == ["Data" if is_old else None]
 
 
 def test_face_beyond_the_last_slot_has_the_last() -> None:
@@ -364,6 +377,21 @@ def test_attributes_of_any_kind_are_baked(kind: str, domain: str) -> None:
     assert color == pytest.approx(0.735357, abs=0.01)
 
 
+@pytest.mark.parametrize(("kind", "opacity"), [("Attribute", 1), ("VertexColor", 0)])
+def test_alpha_of_an_attribute_that_the_mesh_lacks_is_baked(kind: str, opacity: float) -> None:
+    """Cycles has a color attribute's own node transparent then, and another one opaque."""
+    made = scenes.material("Painted")
+    node = made.node_tree.nodes.new(f"ShaderNode{kind}")
+    setattr(node, "attribute_name" if kind == "Attribute" else "layer_name", "tint")
+    made.node_tree.links.new(node.outputs["Alpha"], scenes.base_color(made).node.inputs["Alpha"])
+    object_ = scenes.square(materials=[made])
+    assert to_bake([object_], Reading(bake=64), TextureCache()) == ("Painted",)
+    arrays = mesh_arrays([object_], "asset", Reading(bake=64))
+    assert any("the color attribute tint is missing on the mesh; baked" in warning for warning in arrays.warnings)
+    found = prepare_surface(arrays, BVHQuery).alpha_at(np.arange(2), np.full((2, 3), 1 / 3))
+    assert found == pytest.approx(opacity)
+
+
 def test_uvs_that_are_not_finite_still_give_a_color() -> None:
     object_ = scenes.square(materials=[textured()])
     object_.data.uv_layers[0].uv[0].vector = (np.nan, np.nan)
@@ -376,3 +404,19 @@ def test_scale_of_zero_reaches_the_metric_as_flat_triangles() -> None:
     object_ = scenes.cube()
     object_.matrix_world = Matrix.Diagonal((0, 0, 0, 1))
     assert scenes.area(mesh_arrays([object_], "asset")) == 0
+
+
+@pytest.mark.parametrize(
+    ("color", "word"),
+    [
+        ((0, 0, 0), "is black all over"),
+        ((9, 200, 0.5), "is beyond 1, and shown as 1, in 67 % of its values"),
+        ((2, 1, 0), ""),
+    ],
+)
+def test_colors_that_cannot_be_meant(color: tuple[float, ...], word: str) -> None:
+    """Of scans whose colors were exported as other numbers, such as floats from 0 to 255."""
+    object_ = scenes.square()
+    object_.data.color_attributes.new("Scan", "FLOAT_COLOR", "POINT").data.foreach_set("color", [*color, 1] * 4)
+    found = [text for text in mesh_arrays([object_], "asset").warnings if "Scan" in text or "color attribute" in text]
+    assert [word in text for text in found] == ([True] if word else [])

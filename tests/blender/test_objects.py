@@ -718,6 +718,21 @@ def test_an_instances_own_mesh_is_baked_where_it_stands() -> None:
     assert np.abs(seen - middle).max() < 0.02
 
 
+def test_a_mesh_that_only_instances_have_is_baked_with_its_owners_properties() -> None:
+    tinted = scenes.material("Tinted")
+    tint = tinted.node_tree.nodes.new("ShaderNodeAttribute")
+    tint.attribute_name, tint.attribute_type = "tint", "OBJECT"
+    tinted.node_tree.links.new(tint.outputs["Color"], scenes.base_color(tinted))
+    point = scenes.add("Point", [(0, 0, 0)], [])
+    point["tint"] = (0.8, 0.3, 0.1)
+    tree = on_points(scenes.add("Nothing", [], []))
+    next(node for node in tree.nodes if node.type == "SET_MATERIAL").inputs["Material"].default_value = tinted
+    point.modifiers.new("Nodes", "NODES").node_group = tree
+    arrays = mesh_arrays([point], "asset", Reading(bake=64))
+    seen = decode_srgb(arrays.materials[0].color.lookup(arrays.corners.mean(axis=1).astype(np.float64)))
+    assert np.abs(seen - (0.8, 0.3, 0.1)).max() < 0.02
+
+
 def test_the_panel_says_that_it_bakes() -> None:
     """Before the step that takes a while."""
     stone = scenes.cube("Stone", materials=[procedural(), scenes.material("Red", (1, 0, 0))])

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import struct
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 
 from fmqm_addon.blender.files import load_placed
-from fmqm_addon.blender.images import load_texture
+from fmqm_addon.blender.images import black_warnings, load_texture
 from fmqm_addon.blender.mesh import AS_FOUND
 from fmqm_addon.metric.errors import MeshError
 
@@ -56,6 +57,7 @@ def told(path: Path) -> list[str]:
         ),
         ("mtllib sub.mtl\nusemtl blue\nusemtl red\n" + TETRAHEDRON, []),
         ("mtllib \\\nsub.mtl\nusemtl \\ \r\n red\n" + TETRAHEDRON, []),
+        ("mtllib sub.mtl\nusemtl \n" + TETRAHEDRON, []),
         (WITH_COLORS, ["its vertex colors were left out by Blender's importer, since not all vertices have one"]),
         (WITH_COLORS.replace("v 1 0 0\nv 0 1 0\nv 0 0 1", "v 1 0 0 1 1 1\nv 0 1 0 1 1 1\nv 0 0 1 0 0 0"), []),
     ],
@@ -76,6 +78,7 @@ def test_line_at_which_blender_gives_up(tmp_path: Path, before: str) -> None:
         said = told(path)
     except MeshError as error:
         said = [str(error)]
+        assert said[0].startswith(f"{path}: no mesh in it; a surface is wanted (")
     late = bpy.app.version >= (5, 2)
     assert any("4 of" in each and "no lines of 262,144 bytes" in each for each in said) != late, said
 
@@ -139,14 +142,83 @@ def test_the_namesake_counts_as_named(tmp_path: Path) -> None:
     np.testing.assert_allclose(mesh.materials[0].color.lookup(np.zeros((1, 2))), [[1, 0, 0]], atol=1e-6)
 
 
-def test_images_of_a_ply(tmp_path: Path) -> None:
+def test_images_and_faces_of_a_ply(tmp_path: Path) -> None:
     path = tmp_path / "scan.ply"
     path.write_text(
         "ply\nformat ascii 1.0\ncomment TextureFile skin 1.png\nelement vertex 3\nproperty float x\nproperty float y\n"
         "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
         "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
     )
-    assert told(path) == ["names the image skin 1.png, which Blender does not read from a PLY"]
+    names = "names the image skin 1.png, which Blender does not read from a PLY"
+    assert told(path) == [names]
+    path.write_text(path.read_text().replace("face 1", "face 3") + "3 0 1 9\n3 0 0 1\n")
+    assert told(path) == ["2 of 3 faces were left out by Blender's importer, as broken or repeated", names]
+
+
+def test_why_nothing_remains_of_a_file(tmp_path: Path) -> None:
+    """The error names the file once, and what was left out."""
+    path = tmp_path / "shape.obj"
+    path.write_text("v 0 0 0\nf 1 1 1\n")
+    with pytest.raises(MeshError) as caught:
+        load_placed(str(path))
+    said = "1 of 1 faces were left out by Blender's importer, as broken or repeated"
+    assert str(caught.value) == f"{path}: the mesh has no faces; a surface is wanted ({said})"
+
+
+@pytest.mark.parametrize(
+    ("lines", "unread"),
+    [
+        ("Kd 1 .5 -0\r", ""),
+        ("Kd\t1.0e-1 0.5  0 # red", ""),
+        ("Kd 1 0 0\nmap_Ka image.png\nmap_Kd image.png", ""),
+        ("kd 1 0 0", "kd 1 0 0"),
+        ("map_kd image.png", "map_kd image.png"),
+        ("Kd 0 0 0\nmap_Ka image.png", "map_Ka image.png"),
+        ("Kd 0,5 0,5 0,5", "Kd 0,5 0,5 0,5"),
+        ("Kd 0.5", "Kd 0.5"),
+        ("Kd spectral red.rfl", "Kd spectral red.rfl"),
+        ("Kd 1 1 1\nnewmtl other\nkd 0 0 0", ""),
+    ],
+)
+def test_unread_colors_of_a_material_file(tmp_path: Path, lines: str, unread: str) -> None:
+    write_png(tmp_path / "image.png", noise())
+    path = write_torus(tmp_path, "ring", "image.png")
+    name = (tmp_path / "ring.mtl").read_text().split()[1]
+    (tmp_path / "ring.mtl").write_text(f"newmtl {name}\n{lines}\n")
+    said = f"its material file says {unread}, which Blender does not read as a color"
+    assert told(path) == ([said] if unread else [])
+
+
+def test_left_out_facets_of_an_stl(tmp_path: Path) -> None:
+    corners = ("0 0 0", "1 0 0", "0 1 0")
+    good, bad = (
+        "facet normal 0 0 1\nouter loop\n" + "".join(f"vertex {each}\n" for each in facet) + "endloop\nendfacet\n"
+        for facet in (corners, corners[:2] + corners[:1])
+    )
+    path = tmp_path / "shape.stl"
+    path.write_text(f"solid facet normal\n{good}endsolid\n")
+    assert told(path) == []
+    said = "1 of 2 faces were left out by Blender's importer, as broken or repeated"
+    path.write_text(f"solid\n{good}{bad}endsolid\n")
+    assert told(path) == [said]
+    facets = [(0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0), (0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0)]
+    path.write_bytes(bytes(80) + struct.pack("<I", 2) + b"".join(struct.pack("<12fH", *each) for each in facets))
+    assert told(path) == [said]
+
+
+@pytest.mark.parametrize("kind", ["NurbsPatch", "Volume"])
+def test_what_blender_does_not_read_of_usd(tmp_path: Path, kind: str) -> None:
+    bpy.utils.expose_bundled_modules()
+    pytest.importorskip("pxr")
+    path = tmp_path / "shape.usda"
+    path.write_text(f'#usda 1.0\n{USD_TRIANGLE}class {kind} "C" {{}}\ndef {kind} "D" {{}}\n')
+    assert told(path) == [f"holds 1 of type {kind}, which Blender does not read as surfaces"]
+
+
+def test_floats_that_are_all_but_black_are_told() -> None:
+    """As whole numbers of 32 bits are, where they count to 255."""
+    assert black_warnings("image.tif", np.full((2, 2, 3), 255 / 2**31, np.float32))
+    assert not black_warnings("image.exr", np.full((2, 2, 3), 0.001, np.float32))
 
 
 def test_a_given_texture_makes_missing_materials_unimportant(tmp_path: Path) -> None:

@@ -159,6 +159,7 @@ def test_clip_is_transparent_outside() -> None:
     for pixels in (np.full((1, 1, 3), 255, np.uint8), np.full((1, 1, 4), 255, np.uint8)):
         assert Texture(pixels, "clip").alpha_at(uv).tolist() == [1, 0.5, 0]
     assert Texture(pixels, "extend").alpha_at(uv).tolist() == [1, 1, 1]
+    assert Texture(pixels, "clip", solid=True).alpha_at(uv).tolist() == [1, 1, 1]
 
 
 def test_color_is_divided_by_alpha_after_the_interpolation() -> None:
