@@ -87,10 +87,12 @@ def open_file(path: str) -> tuple[str, ...]:
     if not os.access(path, os.R_OK):
         raise FileError(f"{path}: permission denied; the file cannot be read")
     check_beside(path)
-    unresolved = _CHECKS[suffix](path) if suffix in _CHECKS else ()
+    with _silent(suffix in _NOISY):
+        unresolved = _CHECKS[suffix](path) if suffix in _CHECKS else ()
     _clear_session()
     try:
-        # Blender prints the tracebacks of importers written in Python, and each folder where it looks for an image.
+        # Blender prints the tracebacks of importers written in Python, each folder where it looks for an image, and
+        # what USD finds odd.
         with redirect_stderr(StringIO()), _silent(suffix in _NOISY):
             _open(os.path.abspath(path), suffix)
     except RuntimeError as error:
@@ -178,10 +180,11 @@ _IMPORTERS: dict[str, Callable[[], bpy.types.Operator]] = {
     ".abc": lambda: bpy.ops.wm.alembic_import,
 }
 # These importers do not mend meshes unless told to, and Blender would read beyond the ends of their arrays.
-_OPTIONS = dict.fromkeys((".usd", ".usda", ".usdc", ".usdz", ".abc"), {"validate_meshes": True})
-_NOISY = {".fbx", ".obj"}
+_USD = (".usd", ".usda", ".usdc", ".usdz")
+_OPTIONS = dict.fromkeys((*_USD, ".abc"), {"validate_meshes": True})
+_NOISY = {".fbx", ".obj", *_USD}
 _CHECKS: dict[str, Callable[[str], tuple[str, ...]]] = {".abc": check_alembic, ".ply": check_ply}
-_CHECKS |= dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), check_usd)
+_CHECKS |= dict.fromkeys(_USD, check_usd)
 
 
 def _named(name: str, path: str) -> bpy.types.Object:

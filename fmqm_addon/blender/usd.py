@@ -23,7 +23,7 @@ def check_usd(path: str) -> tuple[str, ...]:
     """A USD file's meshes and curves must hold what they count, and its shaders must not be connected in rings.
 
     Returns:
-        The references, payloads and layers that are missing, and kinds of prims that Blender does not read.
+        The references, payloads, layers and images that are missing, and kinds of prims that Blender does not read.
 
     Raises:
         FileError: they do not, or are.
@@ -38,6 +38,7 @@ def check_usd(path: str) -> tuple[str, ...]:
     except Tf.ErrorException:
         return ()  # the importer says what is wrong
     sources: dict[Any, Any] = {}
+    missing: dict[str, None] = {}  # in their order
     unread: dict[str, int] = {}
     inner = (prim for prototype in stage.GetPrototypes() for prim in Usd.PrimRange.AllPrims(prototype))
     for prim in (*stage.TraverseAll(), *inner):  # each prototype once, not each of its instances
@@ -48,12 +49,13 @@ def check_usd(path: str) -> tuple[str, ...]:
             _check_counts(path, "curves", "points", curves.GetCurveVertexCountsAttr(), curves.GetPointsAttr())
         elif prim.IsA(UsdShade.Shader):
             sources |= _followed(UsdShade.Shader(prim))
+            missing |= dict.fromkeys(_missing_image(UsdShade.Shader(prim)))
         if prim.GetTypeName() in _UNREAD and prim.IsActive() and prim.IsDefined() and not prim.IsAbstract():
             unread[prim.GetTypeName()] = unread.get(prim.GetTypeName(), 0) + 1
     _check_chains(path, sources)
-    asked = dict.fromkeys(name for error in stage.GetCompositionErrors() for name in _ASSET.findall(str(error))[:1])
+    missing |= dict.fromkeys(name for error in stage.GetCompositionErrors() for name in _ASSET.findall(str(error))[:1])
     return (
-        *(f"refers to {name}, which is missing or cannot be read" for name in asked),
+        *(f"refers to {name}, which is missing or cannot be read" for name in missing),
         *(f"holds {count} of type {kind}, which Blender does not read as surfaces" for kind, count in unread.items()),
     )
 
@@ -88,6 +90,14 @@ def _followed(shader: Any) -> dict[Any, Any]:
     asks = shader.GetInput(_FOLLOWED.get(shader.GetIdAttr().Get(), ""))
     found = asks.GetConnectedSources()[0] if asks else ()
     return {shader.GetPath(): found[0].source.GetPath()} if found else {}
+
+
+def _missing_image(shader: Any) -> list[str]:
+    """The image that a shader names, if it is not there."""
+    asks = shader.GetInput("file")
+    asset = asks.Get() if asks else None
+    path = getattr(asset, "path", "")
+    return [] if not path or asset.resolvedPath or "<UDIM>" in path else [path]
 
 
 def _check_chains(path: str, sources: dict[Any, Any]) -> None:

@@ -134,6 +134,21 @@ def test_missing_parts_of_usd(tmp_path: Path, how: str) -> None:
         load_placed(str(tmp_path / "empty.usda"))
 
 
+def test_missing_image_of_usd(tmp_path: Path) -> None:
+    """The importer makes an image node without an image of it, and prints its name only for programmers."""
+    bpy.utils.expose_bundled_modules()
+    pytest.importorskip("pxr")
+    path, image = tmp_path / "shape.usda", write_png(tmp_path / "skin.png", noise())
+    path.write_text(
+        f"#usda 1.0\n{USD_TRIANGLE}"
+        'def Shader "S" {\nuniform token info:id = "UsdUVTexture"\nasset inputs:file = @./skin.png@\n}\n'
+        'def Shader "Tiles" {\nuniform token info:id = "UsdUVTexture"\nasset inputs:file = @./tile.<UDIM>.png@\n}\n'
+    )
+    assert not told(path)
+    image.unlink()
+    assert told(path) == ["refers to ./skin.png, which is missing or cannot be read"]
+
+
 def test_the_namesake_counts_as_named(tmp_path: Path) -> None:
     (tmp_path / "shape.mtl").write_text(RED)
     (tmp_path / "shape.obj").write_text("usemtl red\n" + TETRAHEDRON)
