@@ -95,7 +95,7 @@ def _followed(shader: Any) -> dict[Any, Any]:
 def _missing_image(shader: Any) -> list[str]:
     """The image that a shader names, if it is not there."""
     asks = shader.GetInput("file")
-    asset = asks.Get() if asks else None
+    asset: Any = asks.Get() if asks else None
     path = getattr(asset, "path", "")
     return [] if not path or asset.resolvedPath or "<UDIM>" in path else [path]
 
