@@ -311,7 +311,7 @@ def _add_image(digest: Any, image: bpy.types.Image) -> None:
         image.pixels.foreach_get(pixels)
         known.append(crc32(pixels.data))
     elif image.packed_files:
-        known += [file.size for file in image.packed_files]
+        known += [file.packed_file.size for file in image.packed_files if file.packed_file is not None]
     elif image.source == "GENERATED":
         known += [image.generated_type, image.generated_width, image.generated_height, *image.generated_color]
     else:

@@ -378,6 +378,25 @@ def test_painting_marks_and_saving_the_image_does_not_take_the_mark_away(
     assert not image.is_dirty and stale_names(fmqm) == {"Rock_LOD1"}
 
 
+def test_painting_of_packed_images_marks(
+    fmqm: ui.scene.FMQMScene, lods: list[bpy.types.Object], tmp_path: Path
+) -> None:
+    """As glTF files bring them, and of a UDIM set."""
+    materials = [scenes.textured(scenes.write_png(tmp_path / f"{n}.100{n}.png", scenes.noise(32))) for n in (1, 2)]
+    one, tiles = (scenes.base_color(each).links[0].from_node.image for each in materials)
+    tiles.source, tiles.filepath = "TILED", str(tmp_path / "2.<UDIM>.png")
+    tiles.tiles[0].number = 1002
+    for image, lod, material in zip((one, tiles), lods[1:], materials, strict=False):
+        image.pack()
+        lod.data.materials[0] = material
+    compare(lods[0], *lods[1:])
+    bpy.ops.fmqm.measure()
+    assert not [row.error for row in fmqm.rows if row.error] and not stale_names(fmqm)
+    one.pixels.foreach_set(np.full(len(one.pixels), 0.5, np.float32))
+    one.pack()
+    assert not one.is_dirty and stale_names(fmqm) == {lods[1].name}
+
+
 def test_vertex_colors_mark(fmqm: ui.scene.FMQMScene, lods: list[bpy.types.Object]) -> None:
     mesh = lods[1].data
     mesh.materials.clear()
