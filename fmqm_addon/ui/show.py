@@ -55,7 +55,7 @@ def measured_row(scene: bpy.types.Scene) -> tuple[str, str, session.Measured]:
         raise FMQMError("there is no result yet; press Measure Quality first")
     measured = session.get(row.uid)
     if measured is None:
-        raise FMQMError(f"{row.name}: {AGAIN}")
+        raise FMQMError(f"{row.name}: {'it could not be measured' if row.error else AGAIN}")
     return row.uid, row.name, measured
 
 

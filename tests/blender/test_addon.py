@@ -158,7 +158,7 @@ def test_the_same_doubles_as_the_script(fmqm: ui.scene.FMQMScene, lods: list[bpy
     [
         ({"settings": {"samples": 8_000}}, "settings are {'samples': 8000}"),
         ({"repeats": 0}, "repeats is 0"),
-        ({"space": "moon"}, "space is 'moon'"),
+        ({"space": "moon"}, "space is 'moon'; it must be one of auto, world, local"),
         ({"bake": -1}, "bake is -1"),
     ],
 )

@@ -210,11 +210,6 @@ def test_zero_scale_that_must_be_undone() -> None:
         place(asset(at(scale=0.0)), asset(at()), "local")
 
 
-def test_unknown_space() -> None:
-    with pytest.raises(ValueError, match="auto, world, local"):
-        place(asset(at()), asset(at()), "everywhere")
-
-
 def test_moving_counts_only_in_the_world() -> None:
     reference = asset(at())
     assert place_counts(place(reference, asset(at())).label)
