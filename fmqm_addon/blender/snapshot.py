@@ -25,6 +25,7 @@ from .mesh import AS_FOUND, mesh_arrays, to_bake
 from .space import Placed
 
 OBJECT, COLLECTION = "OBJECT", "COLLECTION"
+_MOST_PAINTED = 2**24  # values of an image that are looked through, 2048 x 2048 pixels; more would hold up painting
 
 
 @dataclass(frozen=True)
@@ -306,7 +307,9 @@ def _add_image(digest: Any, image: bpy.types.Image) -> None:
     """Of a painted image the pixels, of a file what tells that it was written since: not its folder, which saving
     makes relative and which may move with the .blend."""
     known: list[Any] = [image.source, image.colorspace_settings.name, image.alpha_mode]
-    if image.is_dirty:
+    if image.is_dirty and len(image.pixels) > _MOST_PAINTED:
+        known.append("painted")
+    elif image.is_dirty:
         pixels: NDArray[np.float32] = np.empty(len(image.pixels), np.float32)
         image.pixels.foreach_get(pixels)
         known.append(crc32(pixels.data))

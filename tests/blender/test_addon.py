@@ -16,7 +16,7 @@ import pytest
 
 import fmqm_addon
 from fmqm_addon import api, ui
-from fmqm_addon.blender import job
+from fmqm_addon.blender import job, snapshot
 from fmqm_addon.blender.snapshot import target_of
 from fmqm_addon.metric.errors import SettingsError
 from fmqm_addon.metric.score import COLUMNS, Progress, Stepper, Work
@@ -374,6 +374,21 @@ def test_painting_marks_and_saving_the_image_does_not_take_the_mark_away(
     bpy.ops.fmqm.measure()
     assert not stale_names(fmqm)
     image.pixels.foreach_set(values)
+    image.save()
+    assert not image.is_dirty and stale_names(fmqm) == {"Rock_LOD1"}
+
+
+def test_painting_of_large_images_marks(
+    fmqm: ui.scene.FMQMScene, lods: list[bpy.types.Object], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without a look at all their pixels."""
+    monkeypatch.setattr(snapshot, "_MOST_PAINTED", 32 * 32 * 4 - 1)
+    lods[1].data.materials[0] = scenes.textured(scenes.write_png(tmp_path / "own.png", scenes.noise(32)))
+    image = bpy.data.images["own.png"]
+    compare(lods[0], lods[1])
+    bpy.ops.fmqm.measure()
+    image.pixels[0] = 0.7
+    assert image.is_dirty and stale_names(fmqm) == {"Rock_LOD1"}
     image.save()
     assert not image.is_dirty and stale_names(fmqm) == {"Rock_LOD1"}
 
