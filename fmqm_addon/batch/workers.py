@@ -33,6 +33,7 @@ TRIES = 2  # a pair that ends its worker is tried once more
 _POLL = 0.1  # seconds between looks at the workers
 _WORTHWHILE = 5.0  # seconds of work that a worker is started for, at least
 _BARREN = 3  # workers in a row that end before their first pair: it is not the pairs
+_STARTING = 120.0  # seconds that a worker has to begin its first pair: a busy machine is not the pair's fault
 _GRACE = 30.0  # seconds after its time-out until a stuck worker ends itself, should nobody do it
 _LONGEST = 1e8  # seconds, three years; faulthandler takes no more than its clock can count
 
@@ -196,7 +197,7 @@ class _Worker:
         self.at = ""
         self._shard = shard
         self._read = 0  # bytes of its journal
-        self._heard = time.monotonic()
+        self._heard, self._begun = time.monotonic(), False
         try:
             shard.parent.mkdir(exist_ok=True)
             # A run that was killed may have left one of the same name, which would be read as this worker's.
@@ -225,7 +226,10 @@ class _Worker:
         """Why it must be ended; "" if all is well."""
         if self.ended:
             return ""
-        if time.monotonic() - self._heard > limits.timeout:
+        silent = time.monotonic() - self._heard
+        if not self._begun and silent > max(_STARTING, limits.timeout):
+            return f"it does not begin within {max(_STARTING, limits.timeout):g} s"
+        if self._begun and silent > limits.timeout:
             return f"not scored within {limits.timeout:g} s (--timeout)"
         if limits.memory is not None and (resident_bytes(self._process.pid) or 0) > limits.memory:
             return f"scoring it takes more than {limits.memory / 1e9:g} GB of memory (--memory-limit)"
@@ -243,7 +247,7 @@ class _Worker:
         self._read += len(whole)
         events = [parse_line(line) for line in whole.splitlines()]
         for event in events:
-            self._heard = time.monotonic()
+            self._heard, self._begun = time.monotonic(), True
             self.at = event.get("start", "")
             self.tasks.pop(event.get("done", ""), None)
         return events

@@ -22,6 +22,8 @@ end_with_parent()
 if sys.argv[1] == "refuse":
     sys.exit("no Blender here")
 Path(sys.argv[1]).joinpath(f"{os.getpid()}.pid").touch()
+if Path(sys.argv[1], "slow").exists():
+    time.sleep(3)
 journal = Journal(journal_of(str(shard)))
 for task in (task_of(plain) for plain in json.loads(shard.read_text(encoding="utf-8"))):
     journal.start(task.key)

@@ -66,7 +66,7 @@ def test_each_pair_is_scored_once_by_as_many_workers_as_there_are_jobs(tmp_path:
     [
         ("die", Limits(), "its worker died (SIGKILL), 2 times"),
         ("quit", Limits(), "its worker ended with exit code 1, saying: no memory here, 2 times"),
-        ("hang", Limits(timeout=1.5), "not scored within 1.5 s (--timeout), 2 times"),
+        ("hang", Limits(timeout=3), "not scored within 3 s (--timeout), 2 times"),
         ("swell", Limits(memory=2e8), "scoring it takes more than 0.2 GB of memory (--memory-limit), 2 times"),
     ],
 )
@@ -122,6 +122,21 @@ def test_a_watch_that_stood_still_does_not_take_the_workers_for_stuck(
     monkeypatch.setattr(workers, "_POLL", 2.5)
     watch(tmp_path, tasks_of("nap", "nap", "nap"), jobs=1, limits=Limits(timeout=2))
     assert finished(tmp_path) == Counter(["k0", "k1", "k2"]) and len(list(tmp_path.glob("*.pid"))) == 1
+
+
+def test_starting_a_worker_is_not_the_pairs_time(tmp_path: Path) -> None:
+    """On a busy machine it may take longer than a pair may."""
+    (tmp_path / "slow").touch()
+    watch(tmp_path, tasks_of("fine"), jobs=1, limits=Limits(timeout=2))
+    assert len(list(tmp_path.glob("*.pid"))) == 1
+
+
+def test_a_worker_that_never_begins_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "slow").touch()
+    monkeypatch.setattr(workers, "_STARTING", 0.1)
+    with pytest.raises(FMQMError, match=r"workers end before their first pair \(it does not begin within 0\.1 s\)"):
+        watch(tmp_path, tasks_of("fine"), limits=Limits(timeout=0.1))
+    assert not alive(tmp_path)
 
 
 def test_any_timeout_can_be_counted() -> None:
