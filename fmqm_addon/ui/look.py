@@ -21,7 +21,7 @@ from bpy.props import (
 from ..blender import pointcloud
 from ..metric.errors import FMQMError
 from ..report import layers
-from . import overlay, session, show
+from . import overlay, properties, session, show
 
 PARENT = "FMQM_PT_main"
 _REACH = 14  # pixels around the mouse in which a sample is picked
@@ -459,7 +459,7 @@ class FMQM_PT_ncf(_SubPanel, bpy.types.Panel):  # noqa: N801
 
 
 def _say_if_gone(layout: Any, context: bpy.types.Context) -> None:
-    row = overlay.chosen_row(context.scene)
+    row = properties.active_row(context.scene)
     if row is not None and not row.error and session.get(row.uid) is None:
         layout.label(text="Samples are gone: Measure Again", icon="INFO")
 

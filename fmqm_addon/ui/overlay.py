@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ..blender import pointcloud
 from ..metric.spatial import Floats
 from . import session
-from .properties import FMQMRow
+from .properties import active_row
 
 LEGEND = "fmqm_legend"  # custom property of the objects that have a legend: report.layers.Legend as JSON
 _FONT = 0
@@ -86,12 +86,6 @@ def unregister() -> None:
         bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), "WINDOW")
 
 
-def chosen_row(scene: bpy.types.Scene) -> FMQMRow | None:
-    """The chosen row of a scene's results."""
-    rows, index = scene.fmqm.rows, scene.fmqm.row_index
-    return rows[index] if 0 <= index < len(rows) else None
-
-
 def legends() -> list[dict[str, Any]]:
     """The legends of our objects that this view shows."""
     space = bpy.context.space_data
@@ -121,7 +115,7 @@ def _draw_legends() -> None:
 def belongs_here(shown: UnitFigure) -> bool:
     """Its row is the chosen one of this scene, and was measured in this file; undo may have taken it away."""
     scene = bpy.context.scene
-    row = chosen_row(scene)
+    row = active_row(scene)
     here = row is not None and row.uid == shown.uid and shown.scene == scene.name
     return here and session.get(shown.uid) is not None
 

@@ -14,8 +14,18 @@ from ..report.pair import SHOWN
 from ..report.trust import Line, trust_lines
 from . import session
 from .measuring import why_not
-from .properties import FMQMItem, FMQMRow, item_target, row_attribution, row_reverse, row_scores, row_stderr, row_trust
-from .results import EXPLAINED, active_row, comparable, settings_name
+from .properties import (
+    FMQMItem,
+    FMQMRow,
+    active_row,
+    item_target,
+    row_attribution,
+    row_reverse,
+    row_scores,
+    row_stderr,
+    row_trust,
+)
+from .results import EXPLAINED, comparable, settings_name
 from .scene import FMQMScene
 
 _WIDE = 330  # pixels at scale 1: from here on the rows have room for the four features
@@ -107,7 +117,7 @@ class FMQM_UL_rows(bpy.types.UIList):  # noqa: N801
         split = layout.split(factor=0.36 if wide else 0.68)
         split.label(text=row.name, icon=icon, translate=False)
         numbers = split.row()
-        chosen = active_row(fmqm)
+        chosen = active_row(context.scene)
         numbers.active = chosen is None or comparable(row, chosen)
         for name in SHOWN if wide else SHOWN[:1]:
             numbers.label(text=f"{scores[name]:.4f}" if name == "FMQM" else f"{scores[name]:.2f}")
@@ -264,7 +274,7 @@ class FMQM_PT_results(_Sidebar, bpy.types.Panel):  # noqa: N801
         side.operator("fmqm.remove_row", text="", icon="REMOVE")
         side.separator()
         side.menu("FMQM_MT_results", text="", icon="DOWNARROW_HLT")
-        chosen = active_row(fmqm)
+        chosen = active_row(context.scene)
         if chosen is not None:
             _draw_row(layout, context, fmqm, chosen)
         row = layout.row(align=True)
@@ -286,11 +296,11 @@ class FMQM_PT_trust(_Sidebar, bpy.types.Panel):  # noqa: N801
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        row = active_row(context.scene.fmqm)
+        row = active_row(context.scene)
         return row is not None and bool(row.trust)
 
     def draw(self, context: bpy.types.Context) -> None:
-        row = active_row(context.scene.fmqm)
+        row = active_row(context.scene)
         report = None if row is None else row_trust(row)
         if report is None:
             return

@@ -88,6 +88,12 @@ class FMQMRow(bpy.types.PropertyGroup):
     fingerprint: StringProperty(name="Fingerprint", description="Tells whether what was measured has changed since")
 
 
+def active_row(scene: bpy.types.Scene) -> FMQMRow | None:
+    """The chosen row of a scene's results."""
+    rows, index = scene.fmqm.rows, scene.fmqm.row_index
+    return rows[index] if 0 <= index < len(rows) else None
+
+
 def row_scores(row: FMQMRow) -> dict[str, float] | None:
     """The five scores by the names of metric.score.COLUMNS, in double precision; None for a row with an error."""
     return _columns(row.scores)

@@ -20,8 +20,7 @@ from ..report.fields import save_fields
 from ..report.files import write_text
 from ..report.pair import SHOWN, PairScore, csv_text, json_text, table_text
 from . import session, watch
-from .properties import FMQMRow, row_attribution, row_reverse, row_scores, row_stderr, row_trust
-from .scene import FMQMScene
+from .properties import FMQMRow, active_row, row_attribution, row_reverse, row_scores, row_stderr, row_trust
 
 # What an artist should know of each number: label, and what a low value looks like.
 EXPLAINED = {
@@ -44,11 +43,6 @@ EXPLAINED = {
     ),
 }
 assert set(EXPLAINED) == set(SHOWN)
-
-
-def active_row(fmqm: FMQMScene) -> FMQMRow | None:
-    """The chosen row of the results."""
-    return fmqm.rows[fmqm.row_index] if 0 <= fmqm.row_index < len(fmqm.rows) else None
 
 
 def settings_name(row: FMQMRow) -> str:
@@ -124,7 +118,7 @@ class FMQM_OT_sort_rows(bpy.types.Operator):  # noqa: N801
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         fmqm = context.scene.fmqm
-        chosen = active_row(fmqm)
+        chosen = active_row(context.scene)
         chosen_uid = chosen.uid if chosen else ""
         values = {row.uid: scores[self.column] for row in fmqm.rows if (scores := row_scores(row)) is not None}
         now = list(values)
@@ -235,7 +229,7 @@ class FMQM_OT_save_results(bpy.types.Operator):  # noqa: N801
             self.report({"ERROR"}, "No file is named; say which one to write to")
             return {"CANCELLED"}
         fmqm = context.scene.fmqm
-        row = active_row(fmqm) or fmqm.rows[0]
+        row = active_row(context.scene) or fmqm.rows[0]
         path = bpy.path.abspath(self._with_suffix())
         # One file tells of one set of settings: scores at others do not compare.
         rows = [other for other in fmqm.rows if other.settings == row.settings]

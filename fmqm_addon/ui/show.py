@@ -18,7 +18,7 @@ from ..metric.fields import Fields
 from ..metric.score import Result
 from ..metric.spatial import Floats, Ints, cross
 from ..report import layers, probe
-from . import overlay, session
+from . import overlay, properties, session
 
 if TYPE_CHECKING:
     from .look import FMQMLook
@@ -50,7 +50,7 @@ def measured_row(scene: bpy.types.Scene) -> tuple[str, str, session.Measured]:
     Raises:
         FMQMError: no row, or its samples are gone.
     """
-    row = overlay.chosen_row(scene)
+    row = properties.active_row(scene)
     if row is None:
         raise FMQMError("there is no result yet; press Measure Quality first")
     measured = session.get(row.uid)
@@ -65,7 +65,7 @@ def follow_row(scene: bpy.types.Scene) -> None:
     Raises:
         FMQMError: the row has nothing to show. The list of worst places is empty then, the rest stays.
     """
-    look, row = look_of(scene), overlay.chosen_row(scene)
+    look, row = look_of(scene), properties.active_row(scene)
     if row is None or row.uid != look.worst_uid:
         look.worst.clear()
         look.worst_uid = ""
