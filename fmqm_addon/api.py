@@ -15,7 +15,7 @@ from typing import TypeAlias
 import bpy
 
 from .blender.job import Outcome, measuring
-from .blender.looks import Reading
+from .blender.materials.types import Reading
 from .blender.pair import Question
 from .blender.snapshot import target_of
 from .metric.score import COLUMNS, Result

@@ -30,7 +30,7 @@ from fmqm_addon.batch.rows import Options, Row, Task
 from fmqm_addon.batch.run import score_tasks, units_of, work_off
 from fmqm_addon.batch.sources import glob_files, lod_rows, plain_rows, read_manifest
 from fmqm_addon.batch.workers import Limits, adopt, score_with_workers, workers_command
-from fmqm_addon.blender.looks import MAX_BAKE
+from fmqm_addon.blender.materials.types import MAX_BAKE
 from fmqm_addon.blender.process import FAILED, OK, WRONG_ARGUMENTS, blender_version, require_bpy, run_script
 from fmqm_addon.blender.space import SPACES
 from fmqm_addon.metric.errors import FileError, FMQMError, SettingsError

@@ -21,7 +21,7 @@ from .rows import Options, Row, Task, grouped, task_of
 from .workers import end_when_stuck, end_with_parent, journal_of
 
 if TYPE_CHECKING:
-    from ..blender.looks import Reading
+    from ..blender.materials.types import Reading
     from ..blender.measure import Measurement
     from ..blender.pair import Answer, Question
     from ..blender.space import Placed
@@ -167,7 +167,7 @@ class _Scorer:
         self._log.show(self._units, f"loading {name}")
         began = time.perf_counter()
         from ..blender.files import load_placed
-        from ..blender.images import load_texture
+        from ..blender.materials.images import load_texture
 
         reading = _reading(self._options)
         try:
@@ -220,8 +220,8 @@ def _question(options: Options, row: Row) -> Question:
 
 def _reading(options: Options) -> Reading:
     """How all assets of a run are read, textures of their own aside."""
-    from ..blender.headers import DEFAULT_LIMITS, Limits
-    from ..blender.looks import Reading
+    from ..blender.materials.image_headers import DEFAULT_LIMITS, Limits
+    from ..blender.materials.types import Reading
 
     limits = Limits(options.max_image_side or DEFAULT_LIMITS.side, options.max_image_bytes or DEFAULT_LIMITS.decoded)
     reading = Reading(limits=limits)

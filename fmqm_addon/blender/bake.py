@@ -19,7 +19,7 @@ from ..metric.spatial import Floats
 from ..metric.surface import triangle_areas
 from .emission import Shine, is_opaque, shining
 from .layout import LARGEST, Layout, new_layout, own_layout
-from .looks import Layer, Look, Unread
+from .materials.types import Layer, Look, Unread
 
 _MARGIN = 8  # pixels around the parts of an own UV map, for bilinear lookups at their edges
 _ROWS = 256  # of an image that are worked on at a time

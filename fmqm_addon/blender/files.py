@@ -16,9 +16,9 @@ import bpy
 from ..metric.errors import FileError, FMQMError, MeshError, one_line
 from ..metric.surface import MeshArrays
 from .assets import check_instances, check_object, scene_members
-from .images import TextureCache
 from .lods import find_chains
-from .looks import Reading
+from .materials.images import TextureCache
+from .materials.types import Reading
 from .mesh import AS_FOUND, to_bake
 from .remarks import left_out
 from .snapshot import placed

@@ -12,8 +12,8 @@ from ..metric.score import Progress, Stepper, Work, as_part
 from ..metric.spatial import Floats
 from ..metric.trust import Trust
 from .attribution import Attribution
-from .images import TextureCache
-from .looks import Reading
+from .materials.images import TextureCache
+from .materials.types import Reading
 from .measure import Comparison
 from .pair import Answer, Question, answering, measurement_of
 from .snapshot import Target, bakes, fingerprint, take

@@ -22,9 +22,9 @@ from ..metric.surface import MeshArrays, join_meshes
 from .assets import disabled_when_instanced, instanced
 from .bake import Baked, bake_slots, copy_properties
 from .evaluate import Evaluated, Shown, evaluated, shown
-from .images import DARKEST, TextureCache
-from .looks import Layer, Look, Reading, Unread
-from .material import plain_look, read_look
+from .materials.images import DARKEST, TextureCache
+from .materials.read_material import plain_look, read_look
+from .materials.types import Layer, Look, Reading, Unread
 
 AS_FOUND = Reading()  # with the images that the file names, baking what must be
 _WORKING_SPACE = "Linear Rec.709"  # what plain colors and color attributes are taken to be in

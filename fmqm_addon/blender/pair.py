@@ -12,7 +12,7 @@ from ..metric.settings import Settings
 from ..metric.spatial import Floats
 from ..metric.surface import Surface
 from .attribution import Attribution, attribute
-from .looks import MAX_BAKE, Reading
+from .materials.types import MAX_BAKE, Reading
 from .measure import Comparison, Measurement
 from .space import SPACES, Placed, Placement, place
 from .trust import known_facts

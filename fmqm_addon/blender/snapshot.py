@@ -19,8 +19,8 @@ from ..metric.errors import MeshError
 from ..metric.spatial import Floats
 from .assets import SURFACE_TYPES, check_object, collection_members, family_members, instanced, is_measured
 from .evaluate import evaluated
-from .images import TextureCache, image_paths
-from .looks import Reading
+from .materials.images import TextureCache, image_paths
+from .materials.types import Reading
 from .mesh import AS_FOUND, mesh_arrays, to_bake
 from .space import Placed
 

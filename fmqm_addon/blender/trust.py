@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from ..metric.trust import Fact
-from .looks import Reading
+from .materials.types import Reading
 from .space import Placement
 
 

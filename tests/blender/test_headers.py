@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fmqm_addon.blender.headers import Header, file_header, read_header
+from fmqm_addon.blender.materials.image_headers import Header, file_header, read_header
 
 from . import scenes
 

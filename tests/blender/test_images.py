@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from fmqm_addon.blender.bvh import BVHQuery
-from fmqm_addon.blender.headers import Limits
-from fmqm_addon.blender.images import (
+from fmqm_addon.blender.materials.image_headers import Limits
+from fmqm_addon.blender.materials.images import (
     TextureCache,
     image_digest,
     image_facts,
@@ -22,8 +22,8 @@ from fmqm_addon.blender.images import (
     tile_path,
     tile_place,
 )
-from fmqm_addon.blender.looks import Reading
-from fmqm_addon.blender.material import read_look
+from fmqm_addon.blender.materials.read_material import read_look
+from fmqm_addon.blender.materials.types import Reading
 from fmqm_addon.blender.mesh import mesh_arrays
 from fmqm_addon.metric.errors import FileError, ImageSizeError, MeshError
 from fmqm_addon.metric.surface import prepare_surface

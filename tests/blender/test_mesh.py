@@ -13,8 +13,8 @@ import pytest
 from mathutils import Matrix
 
 from fmqm_addon.blender.bvh import BVHQuery
-from fmqm_addon.blender.images import TextureCache
-from fmqm_addon.blender.looks import Reading
+from fmqm_addon.blender.materials.images import TextureCache
+from fmqm_addon.blender.materials.types import Reading
 from fmqm_addon.blender.mesh import mesh_arrays, to_bake
 from fmqm_addon.blender.plain import make_plain
 from fmqm_addon.metric.color import Texture

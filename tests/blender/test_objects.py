@@ -20,7 +20,7 @@ from fmqm_addon.blender.assets import check_object, metaball_mother, scene_membe
 from fmqm_addon.blender.evaluate import evaluated
 from fmqm_addon.blender.files import load_mesh, load_placed
 from fmqm_addon.blender.job import measuring
-from fmqm_addon.blender.looks import Reading
+from fmqm_addon.blender.materials.types import Reading
 from fmqm_addon.blender.measure import Measurement
 from fmqm_addon.blender.mesh import mesh_arrays
 from fmqm_addon.blender.pair import Question

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from fmqm_addon.blender.files import load_placed
-from fmqm_addon.blender.images import black_warnings, load_texture
+from fmqm_addon.blender.materials.images import black_warnings, load_texture
 from fmqm_addon.blender.mesh import AS_FOUND
 from fmqm_addon.metric.errors import MeshError
 

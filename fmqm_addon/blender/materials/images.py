@@ -16,9 +16,9 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..metric.color import ImageFacts, Texture, encode_srgb
-from ..metric.errors import FileError, ImageSizeError, MeshError
-from .headers import DEFAULT_LIMITS, Header, Limits, file_header, read_header
+from ...metric.color import ImageFacts, Texture, encode_srgb
+from ...metric.errors import FileError, ImageSizeError, MeshError
+from .image_headers import DEFAULT_LIMITS, Header, Limits, file_header, read_header
 
 LINEAR_SPACES = frozenset({"Non-Color", "Linear Rec.709", "scene_linear"})
 BRIGHTEST = 1e6  # linear light in float images is kept within this, so that nothing made of it overflows

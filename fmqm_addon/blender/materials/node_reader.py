@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 from mathutils import Euler, Matrix
 
-from ..metric.color import (
+from ...metric.color import (
     MISSING,
     Alpha,
     Arithmetic,
@@ -42,7 +42,8 @@ from ..metric.color import (
     Weighted,
     encode_srgb,
 )
-from ..metric.errors import ImageMissingError
+from ...metric.errors import ImageMissingError
+from .cycles_alpha import merged, used_alphas
 from .images import (
     BRIGHTEST,
     Pixels,
@@ -55,9 +56,8 @@ from .images import (
     tile_place,
     why_unread,
 )
-from .looks import Layer, Reading
-from .nodes import NotReadError, Place, by_identifier, family, only_shines, source, upstream
-from .simplified import merged, used_alphas
+from .node_graph import NotReadError, Place, by_identifier, family, only_shines, source, upstream
+from .types import Layer, Reading
 
 MOST_NODES = 200  # of what feeds a base color; read trees are evaluated recursively
 _EXTENSIONS: dict[str, Extension] = {"REPEAT": "repeat", "EXTEND": "extend", "CLIP": "clip", "MIRROR": "mirror"}

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import bpy
 
-from ..metric.color import ImageFacts, Material
-from ..metric.errors import MeshError
-from .emission import color_of
+from ...metric.color import ImageFacts, Material
+from ...metric.errors import MeshError
+from ..emission import color_of
 from .images import TextureCache, black_warnings
-from .looks import Layer, Look, Reading, Unread
-from .nodes import NotReadError, node_count, outputs, surface_of, upstream, uses_nodes
-from .reader import FIRST_ROLES, Reader, plain_color
+from .node_graph import NotReadError, node_count, outputs, surface_of, upstream, uses_nodes
+from .node_reader import FIRST_ROLES, Reader, plain_color
+from .types import Layer, Look, Reading, Unread
 
 DEFAULT_GREY = 0.8  # linear base color that Blender gives a surface without a material
 MOST_NODES = 100_000  # of a material; renderers copy groups as often as they are used

@@ -10,7 +10,7 @@ from typing import Any
 
 import bpy
 
-from ..metric.errors import FMQMError
+from ...metric.errors import FMQMError
 
 _IS_OLD = bpy.app.version < (5, 2)
 DEEPEST = 100  # groups within groups

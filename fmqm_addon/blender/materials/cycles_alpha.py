@@ -7,7 +7,7 @@ from __future__ import annotations
 import bpy
 
 from .images import same_content
-from .nodes import NotReadError, Place, family, outputs, source, upstream_outputs
+from .node_graph import NotReadError, Place, family, outputs, source, upstream_outputs
 
 # Of the kinds of nodes that images' vectors are read from: the settings that make two of them unlike.
 _SETTINGS = {
