@@ -20,7 +20,7 @@ from ..metric.errors import MeshError, one_line
 from ..metric.spatial import Floats
 from ..metric.surface import MeshArrays, join_meshes
 from .assets import disabled_when_instanced, instanced
-from .bake import Baked, bake_slots, copy_properties
+from .baking.bake import Baked, bake_slots, copy_properties
 from .evaluate import Evaluated, Shown, evaluated, shown
 from .materials.images import DARKEST, TextureCache
 from .materials.read_material import plain_look, read_look

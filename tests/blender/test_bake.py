@@ -13,8 +13,8 @@ import bpy
 import numpy as np
 import pytest
 
-from fmqm_addon.blender import bake
-from fmqm_addon.blender.bake import Baked, bake_slots
+from fmqm_addon.blender.baking import bake
+from fmqm_addon.blender.baking.bake import Baked, bake_slots
 from fmqm_addon.blender.bvh import BVHQuery
 from fmqm_addon.blender.materials.image_headers import Limits
 from fmqm_addon.blender.materials.types import Reading, Unread

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fmqm_addon.blender import layout
-from fmqm_addon.blender.layout import Layout, new_layout, own_layout
+from fmqm_addon.blender.baking import atlas as layout
+from fmqm_addon.blender.baking.atlas import Layout, new_layout, own_layout
 from fmqm_addon.metric.color import Texture
 from fmqm_addon.metric.errors import MeshError
 

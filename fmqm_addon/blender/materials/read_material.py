@@ -10,7 +10,7 @@ import bpy
 
 from ...metric.color import ImageFacts, Material
 from ...metric.errors import MeshError
-from ..emission import color_of
+from ..baking.emission import color_of
 from .images import TextureCache, black_warnings
 from .node_graph import NotReadError, node_count, outputs, surface_of, upstream, uses_nodes
 from .node_reader import FIRST_ROLES, Reader, plain_color

@@ -13,13 +13,13 @@ import numpy as np
 from idprop.types import IDPropertyArray
 from numpy.typing import NDArray
 
-from ..metric.color import ImageAlpha, Material, Opacity, Texture, encode_srgb
-from ..metric.errors import MeshError
-from ..metric.spatial import Floats
-from ..metric.surface import triangle_areas
+from ...metric.color import ImageAlpha, Material, Opacity, Texture, encode_srgb
+from ...metric.errors import MeshError
+from ...metric.spatial import Floats
+from ...metric.surface import triangle_areas
+from ..materials.types import Layer, Look, Unread
+from .atlas import LARGEST, Layout, new_layout, own_layout
 from .emission import Shine, is_opaque, shining
-from .layout import LARGEST, Layout, new_layout, own_layout
-from .materials.types import Layer, Look, Unread
 
 _MARGIN = 8  # pixels around the parts of an own UV map, for bilinear lookups at their edges
 _ROWS = 256  # of an image that are worked on at a time

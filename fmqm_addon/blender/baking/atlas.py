@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..metric.errors import MeshError
-from ..metric.spatial import Floats, Ints, dot
-from ..metric.surface import triangle_areas
+from ...metric.errors import MeshError
+from ...metric.spatial import Floats, Ints, dot
+from ...metric.surface import triangle_areas
 
 LARGEST = 8192  # pixels a side
 _ROOMY, _TIGHT = 4, 2  # smallest sides of cells: one that still shows gradients, one that is left if there is no room

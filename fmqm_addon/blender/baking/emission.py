@@ -10,8 +10,8 @@ from enum import Enum
 
 import bpy
 
-from .materials.cycles_alpha import divided
-from .materials.node_graph import active_output, only_shines
+from ..materials.cycles_alpha import divided
+from ..materials.node_graph import active_output, only_shines
 
 # Mixing never hides one of its shaders wholly: what a transparent one covers still has a color.
 _LEAST_SHARE = 1e-4
