@@ -16,8 +16,8 @@ import bpy
 
 from .blender.job import Outcome, measuring
 from .blender.materials.types import Reading
-from .blender.pair import Question
 from .blender.snapshot import target_of
+from .comparison.pair import Question
 from .metric.score import COLUMNS, Result
 from .metric.settings import PRESETS, Settings
 
@@ -56,7 +56,7 @@ def measure(
     Returns:
         One outcome per distorted asset, in their order; `outcome.scores` is (5,) float64 in the order of
         COLUMNS, or None with the reason in `outcome.error`. `outcome.comparison.result` is a metric.score.Result
-        with patches, samples and fields, `outcome.trust` a metric.trust.Trust: how far to believe the scores.
+        with patches, samples and fields, `outcome.trust` a comparison.trust.Trust: how far to believe the scores.
 
     Raises:
         TypeError: an asset is no object and no collection.

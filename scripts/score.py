@@ -32,7 +32,7 @@ from fmqm_addon.batch.sources import glob_files, lod_rows, plain_rows, read_mani
 from fmqm_addon.batch.workers import Limits, adopt, score_with_workers, workers_command
 from fmqm_addon.blender.materials.types import MAX_BAKE
 from fmqm_addon.blender.process import FAILED, OK, WRONG_ARGUMENTS, blender_version, require_bpy, run_script
-from fmqm_addon.blender.space import SPACES
+from fmqm_addon.comparison.alignment import SPACES
 from fmqm_addon.metric.errors import FileError, FMQMError, SettingsError
 from fmqm_addon.metric.settings import CENTERS, COLOR_SPACES, POOLINGS, PRESETS, SETTING_NAMES, Settings
 from fmqm_addon.report.explain import explain
@@ -43,7 +43,7 @@ from fmqm_addon.report.pair import csv_parts, json_parts, table_parts, trust_par
 from fmqm_addon.report.pair_pictures import has_pictures, open_report_folder
 
 if TYPE_CHECKING:
-    from fmqm_addon.blender.pair import Answer
+    from fmqm_addon.comparison.pair import Answer
 
 PROGRAM = "score.py"
 

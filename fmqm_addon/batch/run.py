@@ -22,9 +22,9 @@ from .workers import end_when_stuck, end_with_parent, journal_of
 
 if TYPE_CHECKING:
     from ..blender.materials.types import Reading
-    from ..blender.measure import Measurement
-    from ..blender.pair import Answer, Question
-    from ..blender.space import Placed
+    from ..comparison.alignment import Placed
+    from ..comparison.measurement import Measurement
+    from ..comparison.pair import Answer, Question
     from ..metric.score import Stepper
 
 T = TypeVar("T")
@@ -79,7 +79,7 @@ class _Scorer:
 
     def score(self, group: Sequence[Task]) -> None:
         """Prepares the reference that the tasks share, and scores them one by one."""
-        from ..blender.pair import measurement_of
+        from ..comparison.pair import measurement_of
 
         row = group[0].row
         asked = _question(self._options, row)
@@ -128,7 +128,7 @@ class _Scorer:
         self._seconds = {}
 
     def _compare(self, pair: PairScore, row: Row, reference: Placed, measurement: Measurement) -> PairScore:
-        from ..blender.pair import answering
+        from ..comparison.pair import answering
         from ..report.trust import trust_dict
 
         loaded = self._load(row, row.distorted, row.texture)
@@ -179,7 +179,7 @@ class _Scorer:
             self._spent("load", time.perf_counter() - began)
 
     def _tell_memory(self, reference: Placed, asked: Question) -> None:
-        from ..blender.memory import WORTH_SAYING, peak_bytes, peak_text
+        from ..comparison.memory import WORTH_SAYING, peak_bytes, peak_text
 
         if peak_bytes(reference.mesh, asked.settings, asked.repeats) > WORTH_SAYING:
             self._log.note(peak_text(reference.mesh, asked.settings, asked.repeats))
@@ -205,7 +205,7 @@ def _told(error: Exception, name: str) -> str:
 
 
 def _question(options: Options, row: Row) -> Question:
-    from ..blender.pair import Question
+    from ..comparison.pair import Question
 
     return Question(
         options.settings_of(row),

@@ -17,11 +17,11 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ..comparison.measurement import Measurement
 from ..metric.errors import FMQMError, MeshError, SettingsError
 from ..metric.score import COLUMNS, Progress, Stepper, Work, as_part
 from ..metric.settings import FAST_SCORED_PATCHES, Settings
 from ..metric.surface import MeshArrays, weld
-from .measure import Measurement
 from .snapshot import placed
 
 TOLERANCE = 0.01  # neighboring versions differ by this share of their triangles

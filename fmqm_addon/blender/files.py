@@ -13,6 +13,7 @@ from pathlib import Path
 
 import bpy
 
+from ..comparison.alignment import Placed
 from ..metric.errors import FileError, FMQMError, MeshError, one_line
 from ..metric.surface import MeshArrays
 from .assets import check_instances, check_object, scene_members
@@ -22,7 +23,6 @@ from .materials.types import Reading
 from .mesh import AS_FOUND, to_bake
 from .remarks import left_out
 from .snapshot import placed
-from .space import Placed
 from .spec import SUFFIXES, split_spec
 from .truncated import check_alembic, check_beside, check_ply
 from .usd import check_usd

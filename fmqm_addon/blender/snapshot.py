@@ -15,6 +15,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ..comparison.alignment import Placed
 from ..metric.errors import MeshError
 from ..metric.spatial import Floats
 from .assets import SURFACE_TYPES, check_object, collection_members, family_members, instanced, is_measured
@@ -22,7 +23,6 @@ from .evaluate import evaluated
 from .materials.images import TextureCache, image_paths
 from .materials.types import Reading
 from .mesh import AS_FOUND, mesh_arrays, to_bake
-from .space import Placed
 
 OBJECT, COLLECTION = "OBJECT", "COLLECTION"
 _MOST_PAINTED = 2**24  # values of an image that are looked through, 2048 x 2048 pixels; more would hold up painting

@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-from ..metric.trust import Fact
+from ..comparison.alignment import Placement
+from ..comparison.trust import Fact
 from .materials.types import Reading
-from .space import Placement
 
 
 def known_facts(placement: Placement, reading: Reading) -> tuple[Fact, ...]:

@@ -36,7 +36,7 @@ class PairScore:
         scores, stderr: (5,) in the order of metric.score.COLUMNS; None where there are none.
         seconds: by STAGES; what several pairs share is counted in the first.
         error: why there are no scores.
-        space: where the two were compared, as blender.space.Placement.label has it.
+        space: where the two were compared, as comparison.alignment.Placement.label has it.
         reverse: (5,) scores of the other direction, the distorted mesh as the reference; None: not asked for.
         trust: as report.trust.trust_dict has it.
         findings: what else was asked for, by its key in the record: where, attribution, pictures.

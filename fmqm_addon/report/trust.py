@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ..comparison.trust import Fact, Trust
 from ..metric.errors import one_line
-from ..metric.trust import Fact, Trust
 
 Report = dict[str, dict[str, dict[str, Any]]]  # group, fact, "value" and "unit"
 

@@ -12,8 +12,8 @@ import numpy as np
 from bl_operators.presets import AddPresetBase
 
 from ..blender.job import Outcome, measuring
-from ..blender.pair import Question
 from ..blender.snapshot import Target, target_of
+from ..comparison.pair import Question
 from ..metric.errors import FMQMError
 from ..metric.score import Stepper
 from ..report.trust import trust_dict

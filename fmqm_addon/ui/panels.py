@@ -8,7 +8,7 @@ from typing import ClassVar
 import bpy
 from bl_ui.utils import PresetPanel
 
-from ..blender.space import PLACE_LABELS
+from ..comparison.alignment import PLACE_LABELS
 from ..metric.score import COLUMNS
 from ..report.pair import SHOWN
 from ..report.trust import Line, trust_lines

@@ -12,7 +12,7 @@ import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
 from ..blender.assets import is_measured
-from ..blender.space import SPACES
+from ..comparison.alignment import SPACES
 from ..metric.score import COLUMNS
 from ..metric.settings import FAST_SCORED_PATCHES, SETTING_NAMES, Settings
 from ..report.trust import Report
@@ -110,7 +110,7 @@ def row_reverse(row: FMQMRow) -> dict[str, float] | None:
 
 
 def row_attribution(row: FMQMRow) -> dict[str, Any] | None:
-    """Whose loss it is, as blender.attribution.Attribution.as_dict has it; None where that was not measured."""
+    """Whose loss it is, as comparison.attribution.Attribution.as_dict has it; None where that was not measured."""
     found: dict[str, Any] | None = json.loads(row.attribution) if row.attribution else None
     return found
 

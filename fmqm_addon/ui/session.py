@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from ..blender.measure import Comparison
+from ..comparison.measurement import Comparison
 from ..metric.spatial import Floats
 from ..metric.surface import Surface
 

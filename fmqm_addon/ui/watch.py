@@ -14,7 +14,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..blender.snapshot import Target, fingerprint, in_edit_mode
-from ..blender.space import place_counts
+from ..comparison.alignment import place_counts
 from . import session, show
 from .properties import FMQMRow, item_target, kept
 

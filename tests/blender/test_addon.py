@@ -659,8 +659,8 @@ def test_python_api(lods: list[bpy.types.Object]) -> None:
 def test_stepping_needs_no_scene(lods: list[bpy.types.Object]) -> None:
     """Objects may be deleted, or the file replaced, once the first steps have read them."""
     from fmqm_addon.blender.job import measuring
-    from fmqm_addon.blender.pair import Question
     from fmqm_addon.blender.snapshot import target_of
+    from fmqm_addon.comparison.pair import Question
 
     expected = api.measure(lods[0], lods[1], QUICK)[0].scores
     stepper = measuring(target_of(lods[0]), [target_of(lods[1])], Question(QUICK))
@@ -673,8 +673,8 @@ def test_stepping_needs_no_scene(lods: list[bpy.types.Object]) -> None:
 
 def test_the_scene_changes_before_it_is_read(lods: list[bpy.types.Object]) -> None:
     from fmqm_addon.blender.job import measuring
-    from fmqm_addon.blender.pair import Question
     from fmqm_addon.blender.snapshot import target_of
+    from fmqm_addon.comparison.pair import Question
 
     stepper = measuring(target_of(lods[0]), [target_of(lod) for lod in lods[1:]], Question(QUICK))
     stepper.step()

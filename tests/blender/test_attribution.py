@@ -14,12 +14,12 @@ import pytest
 
 import fmqm_addon
 from fmqm_addon import api
-from fmqm_addon.blender.attribution import Attribution, attribute
 from fmqm_addon.blender.files import load_mesh
 from fmqm_addon.blender.job import measuring
-from fmqm_addon.blender.measure import Measurement
-from fmqm_addon.blender.pair import Question
 from fmqm_addon.blender.snapshot import target_of
+from fmqm_addon.comparison.attribution import Attribution, attribute
+from fmqm_addon.comparison.measurement import Measurement
+from fmqm_addon.comparison.pair import Question
 from fmqm_addon.metric.settings import PRESETS, Settings
 from fmqm_addon.metric.surface import MeshArrays
 from fmqm_addon.ui import inputs, panels

@@ -16,7 +16,7 @@ import pytest
 from fmqm_addon.blender import files
 from fmqm_addon.blender.files import SUFFIXES, load_mesh, split_spec
 from fmqm_addon.blender.materials.types import Reading
-from fmqm_addon.blender.measure import Measurement
+from fmqm_addon.comparison.measurement import Measurement
 from fmqm_addon.metric.color import Texture
 from fmqm_addon.metric.errors import FileError, FMQMError, MeshError
 from fmqm_addon.metric.settings import Settings

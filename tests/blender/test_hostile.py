@@ -16,8 +16,8 @@ import bpy
 import pytest
 
 from fmqm_addon.blender.files import SUFFIXES, load_placed
-from fmqm_addon.blender.measure import Measurement
-from fmqm_addon.blender.space import place
+from fmqm_addon.comparison.alignment import place
+from fmqm_addon.comparison.measurement import Measurement
 from fmqm_addon.metric.errors import FMQMError
 from fmqm_addon.metric.settings import Settings
 

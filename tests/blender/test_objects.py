@@ -21,11 +21,11 @@ from fmqm_addon.blender.evaluate import evaluated
 from fmqm_addon.blender.files import load_mesh, load_placed
 from fmqm_addon.blender.job import measuring
 from fmqm_addon.blender.materials.types import Reading
-from fmqm_addon.blender.measure import Measurement
 from fmqm_addon.blender.mesh import mesh_arrays
-from fmqm_addon.blender.pair import Question
 from fmqm_addon.blender.snapshot import fingerprint, take, target_of
-from fmqm_addon.blender.space import place
+from fmqm_addon.comparison.alignment import place
+from fmqm_addon.comparison.measurement import Measurement
+from fmqm_addon.comparison.pair import Question
 from fmqm_addon.metric.color import decode_srgb
 from fmqm_addon.metric.errors import MeshError
 from fmqm_addon.metric.settings import Settings

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fmqm_addon.blender.space import APART, Placed, misfit, moved, place, place_counts, unit_factor
+from fmqm_addon.comparison.alignment import APART, Placed, misfit, moved, place, place_counts, unit_factor
 from fmqm_addon.metric.color import PlainColor
 from fmqm_addon.metric.errors import MeshError
 from fmqm_addon.metric.surface import MeshArrays

@@ -16,11 +16,11 @@ import pytest
 import fmqm_addon
 from fmqm_addon import api
 from fmqm_addon.blender.files import load_mesh
-from fmqm_addon.blender.measure import Measurement
+from fmqm_addon.comparison.measurement import Measurement
+from fmqm_addon.comparison.trust import Fact
 from fmqm_addon.metric.score import COLUMNS
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.surface import MeshArrays
-from fmqm_addon.metric.trust import Fact
 from fmqm_addon.report.trust import trust_dict
 from fmqm_addon.ui import panels
 from fmqm_addon.ui.properties import row_reverse, row_trust

@@ -12,12 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fmqm_addon.metric.color import ImageFacts, Material, PlainColor
-from fmqm_addon.metric.score import Evaluation, Result
-from fmqm_addon.metric.settings import Settings
-from fmqm_addon.metric.spatial import Floats, Ints
-from fmqm_addon.metric.surface import MeshArrays, Surface, finish, join_meshes, prepare_surface, triangle_areas
-from fmqm_addon.metric.trust import (
+from fmqm_addon.comparison.trust import (
     ADDED,
     FLIPPED,
     Trust,
@@ -30,6 +25,11 @@ from fmqm_addon.metric.trust import (
     spread_points,
     surface_facts,
 )
+from fmqm_addon.metric.color import ImageFacts, Material, PlainColor
+from fmqm_addon.metric.score import Evaluation, Result
+from fmqm_addon.metric.settings import Settings
+from fmqm_addon.metric.spatial import Floats, Ints
+from fmqm_addon.metric.surface import MeshArrays, Surface, finish, join_meshes, prepare_surface, triangle_areas
 from fmqm_addon.report.trust import trust_dict, trust_lines, trust_text
 
 from .meshes import SMALL, TRIANGLE, cube, grid, mesh_arrays, moved, shaken, sphere, surface, texture

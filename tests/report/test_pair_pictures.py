@@ -35,7 +35,7 @@ def test_only_output_errors_stop_the_run(monkeypatch: pytest.MonkeyPatch, error:
     for name in ("_load", "_tell_memory", "_work"):
         monkeypatch.setattr(scorer, name, lambda *_: type("Placed", (), {"world": lambda self: None})())
     monkeypatch.setattr(
-        "fmqm_addon.blender.measure.Measurement", lambda *_: type("M", (), {"prepare": lambda self: None})()
+        "fmqm_addon.comparison.measurement.Measurement", lambda *_: type("M", (), {"prepare": lambda self: None})()
     )
     monkeypatch.setattr(scorer, "_compare", fail)
     task = Task("key", Row("1", "r", "d"))

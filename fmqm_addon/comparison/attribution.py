@@ -20,7 +20,7 @@ from ..metric.fields import closest_on
 from ..metric.score import COLUMNS, Progress, Stepper, Work, as_part
 from ..metric.spatial import Floats, Ints
 from ..metric.surface import MeshArrays, Surface
-from .measure import Comparison, Measurement
+from .measurement import Comparison, Measurement
 
 How = Literal["materials", "nearest points"]
 Mostly = Literal["nothing", "geometry", "texture", "both"]

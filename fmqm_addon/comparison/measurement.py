@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..blender.bvh import BVHQuery
 from ..metric.errors import MeshError
 from ..metric.score import COLUMNS, Evaluation, Progress, Result, Stepper, Work, as_part, as_work
 from ..metric.settings import Settings
 from ..metric.spatial import Floats
 from ..metric.surface import MeshArrays, Surface, preparing_surface
-from ..metric.trust import Fact, Trust, assessing, surface_facts
-from .bvh import BVHQuery
+from .trust import Fact, Trust, assessing, surface_facts
 
 
 @dataclass(frozen=True)

@@ -6,16 +6,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..blender.materials.types import MAX_BAKE, Reading
+from ..blender.trust import known_facts
 from ..metric.errors import SettingsError
 from ..metric.score import Stepper, Work, as_part
 from ..metric.settings import Settings
 from ..metric.spatial import Floats
 from ..metric.surface import Surface
+from .alignment import SPACES, Placed, Placement, place
 from .attribution import Attribution, attribute
-from .materials.types import MAX_BAKE, Reading
-from .measure import Comparison, Measurement
-from .space import SPACES, Placed, Placement, place
-from .trust import known_facts
+from .measurement import Comparison, Measurement
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Question:
 
     Attributes:
         settings: of the metric. repeats: seeds settings.seed to settings.seed + repeats - 1.
-        space, match_scale: as in blender.space.place.
+        space, match_scale: as in comparison.alignment.place.
         both: score the other direction too. attribution: score geometry and texture apart too.
         reading: how the materials are read.
 
