@@ -14,9 +14,9 @@ from typing import TypeAlias
 
 import bpy
 
-from .blender.job import Outcome, measuring
 from .blender.materials.types import Reading
-from .blender.snapshot import target_of
+from .blender.scene.measure import Outcome, measuring
+from .blender.scene.target import target_of
 from .comparison.pair import Question
 from .metric.score import COLUMNS, Result
 from .metric.settings import PRESETS, Settings

@@ -140,8 +140,8 @@ def run_batch(reference: str, distorted: str, pairs: int, jobs: int, flags: list
 
 def query_floor(reference: str, distorted: str, samples: str) -> None:
     """Prints the seconds of the plain loops on both surfaces, and the reference's triangles."""
-    from fmqm_addon.blender.bvh import BVHQuery
     from fmqm_addon.blender.files import load_mesh
+    from fmqm_addon.blender.scene.bvh import BVHQuery
     from fmqm_addon.metric.score import Evaluation
     from fmqm_addon.metric.settings import Settings
     from fmqm_addon.metric.spatial import morton_order

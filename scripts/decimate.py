@@ -27,7 +27,7 @@ from scripts.score import OneLineParser
 PROGRAM = "decimate.py"
 
 if TYPE_CHECKING:
-    from fmqm_addon.blender.decimate import Found, Outcome, Reduced, Step
+    from fmqm_addon.blender.scene.decimate import Found, Outcome, Reduced, Step
 
 
 def build_parser() -> OneLineParser:
@@ -110,7 +110,6 @@ def _targets(args: argparse.Namespace) -> list[float]:
 def _search(args: argparse.Namespace, targets: list[float], settings: Settings, log: Log, out: TextIO) -> int:
     """Searches, prints, writes; Blender is imported only once the arguments are known to be good."""
     require_bpy()
-    from fmqm_addon.blender.decimate import Wish, reducing
     from fmqm_addon.blender.reduced import (
         check_ending,
         check_outputs,
@@ -119,6 +118,7 @@ def _search(args: argparse.Namespace, targets: list[float], settings: Settings, 
         texture_sizes,
         written_reader,
     )
+    from fmqm_addon.blender.scene.decimate import Wish, reducing
     from fmqm_addon.report.files import check_writable, print_parts, write_text
 
     outputs = _output_names(args.output, targets if args.chain else [])

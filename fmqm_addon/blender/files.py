@@ -16,13 +16,13 @@ import bpy
 from ..comparison.alignment import Placed
 from ..metric.errors import FileError, FMQMError, MeshError, one_line
 from ..metric.surface import MeshArrays
-from .assets import check_instances, check_object, scene_members
-from .lods import find_chains
 from .materials.images import TextureCache
 from .materials.types import Reading
-from .mesh import AS_FOUND, to_bake
 from .remarks import left_out
-from .snapshot import placed
+from .scene.lods import find_chains
+from .scene.members import check_instances, check_object, scene_members
+from .scene.mesh_arrays import AS_FOUND, to_bake
+from .scene.target import placed
 from .spec import SUFFIXES, split_spec
 from .truncated import check_alembic, check_beside, check_ply
 from .usd import check_usd

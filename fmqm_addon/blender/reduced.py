@@ -15,10 +15,10 @@ import bpy
 
 from ..metric.errors import FileError, FMQMError, MeshError, SettingsError
 from ..metric.surface import MeshArrays
-from .assets import instanced, scene_members
-from .decimate import Reader, Version, add_modifiers, scene_reader
 from .files import last_line, load_mesh, open_file
 from .plain import ancestors, make_plain
+from .scene.decimate import Reader, Version, add_modifiers, scene_reader
+from .scene.members import instanced, scene_members
 from .spec import split_spec
 
 NOT_COLOR = "Non-Color"

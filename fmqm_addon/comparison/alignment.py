@@ -227,7 +227,7 @@ def _lopsidedness(mesh: MeshArrays, matrix: Floats) -> Floats:
 
 
 def _transformed(positions: Floats, matrix: Floats) -> Floats:
-    """The same arithmetic as in blender.mesh, so that the same mesh has the same bits."""
+    """The same arithmetic as in blender.scene.mesh_arrays, so that the same mesh has the same bits."""
     with np.errstate(all="ignore"):  # coordinates that are not finite are dealt with by the metric
         return positions @ matrix[:3, :3].T + matrix[:3, 3]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..blender.bvh import BVHQuery
+from ..blender.scene.bvh import BVHQuery
 from ..metric.errors import MeshError
 from ..metric.score import COLUMNS, Evaluation, Progress, Result, Stepper, Work, as_part, as_work
 from ..metric.settings import Settings

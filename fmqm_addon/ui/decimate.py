@@ -8,7 +8,7 @@ from typing import ClassVar
 import bpy
 from bpy.props import BoolProperty, FloatProperty, IntProperty, StringProperty
 
-from ..blender.decimate import (
+from ..blender.scene.decimate import (
     LEAST_TRIANGLES,
     Found,
     Reader,
@@ -19,7 +19,7 @@ from ..blender.decimate import (
     reducing,
     scene_reader,
 )
-from ..blender.snapshot import fingerprint, target_of
+from ..blender.scene.target import fingerprint, target_of
 from ..metric.errors import FMQMError
 from ..metric.score import Stepper, Work
 from ..metric.settings import Settings

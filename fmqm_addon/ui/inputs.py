@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import bpy
 
-from ..blender.lods import find_lods
+from ..blender.scene.lods import find_lods
 from .properties import is_asset, kept
 from .scene import FMQMScene
 

@@ -11,8 +11,8 @@ import bpy
 import numpy as np
 from bl_operators.presets import AddPresetBase
 
-from ..blender.job import Outcome, measuring
-from ..blender.snapshot import Target, target_of
+from ..blender.scene.measure import Outcome, measuring
+from ..blender.scene.target import Target, target_of
 from ..comparison.pair import Question
 from ..metric.errors import FMQMError
 from ..metric.score import Stepper

@@ -13,7 +13,7 @@ from collections.abc import Callable
 import bpy
 from bpy.app.handlers import persistent
 
-from ..blender.snapshot import Target, fingerprint, in_edit_mode
+from ..blender.scene.target import Target, fingerprint, in_edit_mode
 from ..comparison.alignment import place_counts
 from . import session, show
 from .properties import FMQMRow, item_target, kept

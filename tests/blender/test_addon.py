@@ -16,8 +16,9 @@ import pytest
 
 import fmqm_addon
 from fmqm_addon import api, ui
-from fmqm_addon.blender import job, snapshot
-from fmqm_addon.blender.snapshot import target_of
+from fmqm_addon.blender.scene import measure as job
+from fmqm_addon.blender.scene import target as snapshot
+from fmqm_addon.blender.scene.target import target_of
 from fmqm_addon.metric.errors import SettingsError
 from fmqm_addon.metric.score import COLUMNS, Progress, Stepper, Work
 from fmqm_addon.metric.settings import Settings
@@ -658,8 +659,8 @@ def test_python_api(lods: list[bpy.types.Object]) -> None:
 
 def test_stepping_needs_no_scene(lods: list[bpy.types.Object]) -> None:
     """Objects may be deleted, or the file replaced, once the first steps have read them."""
-    from fmqm_addon.blender.job import measuring
-    from fmqm_addon.blender.snapshot import target_of
+    from fmqm_addon.blender.scene.measure import measuring
+    from fmqm_addon.blender.scene.target import target_of
     from fmqm_addon.comparison.pair import Question
 
     expected = api.measure(lods[0], lods[1], QUICK)[0].scores
@@ -672,8 +673,8 @@ def test_stepping_needs_no_scene(lods: list[bpy.types.Object]) -> None:
 
 
 def test_the_scene_changes_before_it_is_read(lods: list[bpy.types.Object]) -> None:
-    from fmqm_addon.blender.job import measuring
-    from fmqm_addon.blender.snapshot import target_of
+    from fmqm_addon.blender.scene.measure import measuring
+    from fmqm_addon.blender.scene.target import target_of
     from fmqm_addon.comparison.pair import Question
 
     stepper = measuring(target_of(lods[0]), [target_of(lod) for lod in lods[1:]], Question(QUICK))

@@ -15,8 +15,8 @@ import pytest
 import fmqm_addon
 from fmqm_addon import api
 from fmqm_addon.blender.files import load_mesh
-from fmqm_addon.blender.job import measuring
-from fmqm_addon.blender.snapshot import target_of
+from fmqm_addon.blender.scene.measure import measuring
+from fmqm_addon.blender.scene.target import target_of
 from fmqm_addon.comparison.attribution import Attribution, attribute
 from fmqm_addon.comparison.measurement import Measurement
 from fmqm_addon.comparison.pair import Question

@@ -15,10 +15,10 @@ import pytest
 
 from fmqm_addon.blender.baking import bake
 from fmqm_addon.blender.baking.bake import Baked, bake_slots
-from fmqm_addon.blender.bvh import BVHQuery
 from fmqm_addon.blender.materials.image_headers import Limits
 from fmqm_addon.blender.materials.types import Reading, Unread
-from fmqm_addon.blender.mesh import mesh_arrays
+from fmqm_addon.blender.scene.bvh import BVHQuery
+from fmqm_addon.blender.scene.mesh_arrays import mesh_arrays
 from fmqm_addon.metric.color import Texture, decode_srgb, encode_srgb
 from fmqm_addon.metric.errors import MeshError
 from fmqm_addon.metric.surface import prepare_surface

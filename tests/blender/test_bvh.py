@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fmqm_addon.blender.bvh import BVHQuery
+from fmqm_addon.blender.scene.bvh import BVHQuery
 from fmqm_addon.metric.fields import count_crossings
 from fmqm_addon.metric.spatial import closest_on_triangles
 from fmqm_addon.metric.surface import MeshArrays, prepare_surface

@@ -15,7 +15,9 @@ import numpy as np
 import pytest
 
 from fmqm_addon import ui
-from fmqm_addon.blender.decimate import (
+from fmqm_addon.blender.files import load_mesh
+from fmqm_addon.blender.reduced import EXPORTERS, file_reader, open_asset, save_version, texture_sizes, written_reader
+from fmqm_addon.blender.scene.decimate import (
     DECIMATE,
     LEAST_TRIANGLES,
     TOLERANCE,
@@ -28,8 +30,6 @@ from fmqm_addon.blender.decimate import (
     reducing,
     scene_reader,
 )
-from fmqm_addon.blender.files import load_mesh
-from fmqm_addon.blender.reduced import EXPORTERS, file_reader, open_asset, save_version, texture_sizes, written_reader
 from fmqm_addon.metric.errors import FMQMError, MeshError, SettingsError
 from fmqm_addon.metric.score import Progress
 from fmqm_addon.metric.settings import Settings

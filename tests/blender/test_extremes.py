@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fmqm_addon.blender.snapshot import placed
+from fmqm_addon.blender.scene.target import placed
 from fmqm_addon.comparison.alignment import place
 from fmqm_addon.comparison.measurement import Measurement
 from fmqm_addon.metric.errors import MeshError

@@ -10,7 +10,6 @@ import bpy
 import numpy as np
 import pytest
 
-from fmqm_addon.blender.bvh import BVHQuery
 from fmqm_addon.blender.materials.image_headers import Limits
 from fmqm_addon.blender.materials.images import (
     TextureCache,
@@ -24,7 +23,8 @@ from fmqm_addon.blender.materials.images import (
 )
 from fmqm_addon.blender.materials.read_material import read_look
 from fmqm_addon.blender.materials.types import Reading
-from fmqm_addon.blender.mesh import mesh_arrays
+from fmqm_addon.blender.scene.bvh import BVHQuery
+from fmqm_addon.blender.scene.mesh_arrays import mesh_arrays
 from fmqm_addon.metric.errors import FileError, ImageSizeError, MeshError
 from fmqm_addon.metric.surface import prepare_surface
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 import pytest
 
-from fmqm_addon.blender.lods import find_lods, lod_of_name
+from fmqm_addon.blender.scene.lods import find_lods, lod_of_name
 
 from . import scenes
 

@@ -15,7 +15,7 @@ import pytest
 
 import fmqm_addon
 from fmqm_addon.blender import pointcloud, viewport
-from fmqm_addon.blender.mesh import mesh_arrays
+from fmqm_addon.blender.scene.mesh_arrays import mesh_arrays
 from fmqm_addon.comparison.measurement import Comparison, Measurement
 from fmqm_addon.metric.color import decode_srgb, srgb_to_lab
 from fmqm_addon.metric.fields import Fields

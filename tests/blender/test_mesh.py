@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from fmqm_addon.blender.bvh import BVHQuery
 from fmqm_addon.blender.materials.images import TextureCache
 from fmqm_addon.blender.materials.types import Reading
-from fmqm_addon.blender.mesh import mesh_arrays, to_bake
 from fmqm_addon.blender.plain import make_plain
+from fmqm_addon.blender.scene.bvh import BVHQuery
+from fmqm_addon.blender.scene.mesh_arrays import mesh_arrays, to_bake
 from fmqm_addon.metric.color import Texture
 from fmqm_addon.metric.errors import MeshError
 from fmqm_addon.metric.surface import prepare_surface

@@ -16,13 +16,13 @@ from hypothesis import strategies as st
 from mathutils import Euler, Matrix, Vector
 
 from fmqm_addon.blender import bake, mesh
-from fmqm_addon.blender.assets import check_object, metaball_mother, scene_members
-from fmqm_addon.blender.evaluate import evaluated
 from fmqm_addon.blender.files import load_mesh, load_placed
-from fmqm_addon.blender.job import measuring
 from fmqm_addon.blender.materials.types import Reading
-from fmqm_addon.blender.mesh import mesh_arrays
-from fmqm_addon.blender.snapshot import fingerprint, take, target_of
+from fmqm_addon.blender.scene.evaluated import evaluated
+from fmqm_addon.blender.scene.measure import measuring
+from fmqm_addon.blender.scene.members import check_object, metaball_mother, scene_members
+from fmqm_addon.blender.scene.mesh_arrays import mesh_arrays
+from fmqm_addon.blender.scene.target import fingerprint, take, target_of
 from fmqm_addon.comparison.alignment import place
 from fmqm_addon.comparison.measurement import Measurement
 from fmqm_addon.comparison.pair import Question

@@ -16,7 +16,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from fmqm_addon.blender.bvh import BVHQuery
+from fmqm_addon.blender.scene.bvh import BVHQuery
 from fmqm_addon.metric.color import Material, PlainColor, Texture
 from fmqm_addon.metric.errors import FileError, FMQMError
 from fmqm_addon.metric.surface import MeshArrays, Surface, prepare_surface

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from fmqm_addon.blender.assets import scene_members
 from fmqm_addon.blender.files import load_mesh, open_file
 from fmqm_addon.blender.materials.images import load_texture
 from fmqm_addon.blender.materials.types import Reading
-from fmqm_addon.blender.mesh import mesh_arrays
+from fmqm_addon.blender.scene.members import scene_members
+from fmqm_addon.blender.scene.mesh_arrays import mesh_arrays
 from fmqm_addon.comparison.measurement import Measurement
 from fmqm_addon.metric.errors import FileError
 from fmqm_addon.metric.score import COLUMNS

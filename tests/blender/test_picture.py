@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fmqm_addon.blender.bvh import BVHQuery
+from fmqm_addon.blender.scene.bvh import BVHQuery
 from fmqm_addon.metric.color import Material, Texture, srgb_to_lab
 from fmqm_addon.metric.errors import FileError, FMQMError
 from fmqm_addon.metric.score import COLUMNS, Evaluation, Result

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mathutils import Matrix
 
-from fmqm_addon.blender.snapshot import placed
+from fmqm_addon.blender.scene.target import placed
 from fmqm_addon.comparison.alignment import SPACES, place
 from fmqm_addon.comparison.measurement import Measurement
 from fmqm_addon.metric.errors import FMQMError

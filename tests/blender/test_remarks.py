@@ -13,7 +13,7 @@ import pytest
 
 from fmqm_addon.blender.files import load_placed
 from fmqm_addon.blender.materials.images import black_warnings, load_texture
-from fmqm_addon.blender.mesh import AS_FOUND
+from fmqm_addon.blender.scene.mesh_arrays import AS_FOUND
 from fmqm_addon.metric.errors import MeshError
 
 from . import scenes

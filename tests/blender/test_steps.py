@@ -9,8 +9,8 @@ from pathlib import Path
 import bpy
 import pytest
 
-from fmqm_addon.blender.bvh import BVHQuery
 from fmqm_addon.blender.files import load_mesh
+from fmqm_addon.blender.scene.bvh import BVHQuery
 from fmqm_addon.comparison.measurement import Measurement
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.spatial import Floats, Ints

@@ -9,9 +9,9 @@ import bpy
 import numpy as np
 import pytest
 
-from fmqm_addon.blender.job import measuring
 from fmqm_addon.blender.materials.types import Reading
-from fmqm_addon.blender.snapshot import target_of
+from fmqm_addon.blender.scene.measure import measuring
+from fmqm_addon.blender.scene.target import target_of
 from fmqm_addon.comparison.pair import Question
 from fmqm_addon.metric.settings import Settings
 

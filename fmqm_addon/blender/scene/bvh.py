@@ -9,8 +9,8 @@ import bpy
 import numpy as np
 from mathutils.bvhtree import BVHTree
 
-from ..metric.errors import MeshError
-from ..metric.spatial import Floats, Ints
+from ...metric.errors import MeshError
+from ...metric.spatial import Floats, Ints
 
 
 class BVHQuery:

@@ -17,12 +17,12 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..comparison.measurement import Measurement
-from ..metric.errors import FMQMError, MeshError, SettingsError
-from ..metric.score import COLUMNS, Progress, Stepper, Work, as_part
-from ..metric.settings import FAST_SCORED_PATCHES, Settings
-from ..metric.surface import MeshArrays, weld
-from .snapshot import placed
+from ...comparison.measurement import Measurement
+from ...metric.errors import FMQMError, MeshError, SettingsError
+from ...metric.score import COLUMNS, Progress, Stepper, Work, as_part
+from ...metric.settings import FAST_SCORED_PATCHES, Settings
+from ...metric.surface import MeshArrays, weld
+from .target import placed
 
 TOLERANCE = 0.01  # neighboring versions differ by this share of their triangles
 LEAST_TRIANGLES = 4  # a tetrahedron

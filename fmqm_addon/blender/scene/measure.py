@@ -7,17 +7,17 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from ..comparison.alignment import Placed, Placement, place_counts
-from ..comparison.attribution import Attribution
-from ..comparison.measurement import Comparison
-from ..comparison.pair import Answer, Question, answering, measurement_of
-from ..comparison.trust import Trust
-from ..metric.errors import FMQMError
-from ..metric.score import Progress, Stepper, Work, as_part
-from ..metric.spatial import Floats
-from .materials.images import TextureCache
-from .materials.types import Reading
-from .snapshot import Target, bakes, fingerprint, take
+from ...comparison.alignment import Placed, Placement, place_counts
+from ...comparison.attribution import Attribution
+from ...comparison.measurement import Comparison
+from ...comparison.pair import Answer, Question, answering, measurement_of
+from ...comparison.trust import Trust
+from ...metric.errors import FMQMError
+from ...metric.score import Progress, Stepper, Work, as_part
+from ...metric.spatial import Floats
+from ..materials.images import TextureCache
+from ..materials.types import Reading
+from .target import Target, bakes, fingerprint, take
 
 _READING = 0.05  # share of the whole that reading the scene takes, about
 

@@ -15,14 +15,14 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..comparison.alignment import Placed
-from ..metric.errors import MeshError
-from ..metric.spatial import Floats
-from .assets import SURFACE_TYPES, check_object, collection_members, family_members, instanced, is_measured
-from .evaluate import evaluated
-from .materials.images import TextureCache, image_paths
-from .materials.types import Reading
-from .mesh import AS_FOUND, mesh_arrays, to_bake
+from ...comparison.alignment import Placed
+from ...metric.errors import MeshError
+from ...metric.spatial import Floats
+from ..materials.images import TextureCache, image_paths
+from ..materials.types import Reading
+from .evaluated import evaluated
+from .members import SURFACE_TYPES, check_object, collection_members, family_members, instanced, is_measured
+from .mesh_arrays import AS_FOUND, mesh_arrays, to_bake
 
 OBJECT, COLLECTION = "OBJECT", "COLLECTION"
 _MOST_PAINTED = 2**24  # values of an image that are looked through, 2048 x 2048 pixels; more would hold up painting

@@ -15,16 +15,16 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
-from ..metric.color import Encoded, Material, VertexColor
-from ..metric.errors import MeshError, one_line
-from ..metric.spatial import Floats
-from ..metric.surface import MeshArrays, join_meshes
-from .assets import disabled_when_instanced, instanced
-from .baking.bake import Baked, bake_slots, copy_properties
-from .evaluate import Evaluated, Shown, evaluated, shown
-from .materials.images import DARKEST, TextureCache
-from .materials.read_material import plain_look, read_look
-from .materials.types import Layer, Look, Reading, Unread
+from ...metric.color import Encoded, Material, VertexColor
+from ...metric.errors import MeshError, one_line
+from ...metric.spatial import Floats
+from ...metric.surface import MeshArrays, join_meshes
+from ..baking.bake import Baked, bake_slots, copy_properties
+from ..materials.images import DARKEST, TextureCache
+from ..materials.read_material import plain_look, read_look
+from ..materials.types import Layer, Look, Reading, Unread
+from .evaluated import Evaluated, Shown, evaluated, shown
+from .members import disabled_when_instanced, instanced
 
 AS_FOUND = Reading()  # with the images that the file names, baking what must be
 _WORKING_SPACE = "Linear Rec.709"  # what plain colors and color attributes are taken to be in

@@ -10,7 +10,7 @@ from typing import TypeAlias
 
 import bpy
 
-from .snapshot import contains_surface
+from .target import contains_surface
 
 Asset: TypeAlias = bpy.types.Object | bpy.types.Collection
 

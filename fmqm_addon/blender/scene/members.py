@@ -8,7 +8,7 @@ from collections.abc import Iterable
 
 import bpy
 
-from ..metric.errors import MeshError
+from ...metric.errors import MeshError
 
 SURFACE_TYPES = ("MESH", "CURVE", "SURFACE", "FONT", "META")  # objects that Blender shows as meshes
 WANTED = "a mesh, curve, surface, text, metaball or empty is wanted"

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ..metric.spatial import Floats
-from .assets import hidden_when_instanced, instanced, metaball_family
+from ...metric.spatial import Floats
+from .members import hidden_when_instanced, instanced, metaball_family
 
 
 @dataclass(frozen=True)
