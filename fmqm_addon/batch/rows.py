@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from ..blender.spec import split_spec
+from ..blender.files.asset_path import split_spec
 from ..metric.settings import Settings
 from ..report.pair import PairScore, pair_record
 

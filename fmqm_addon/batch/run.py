@@ -166,7 +166,7 @@ class _Scorer:
     def _load(self, row: Row, name: str, image: str) -> Placed:
         self._log.show(self._units, f"loading {name}")
         began = time.perf_counter()
-        from ..blender.files import load_placed
+        from ..blender.files.load import load_placed
         from ..blender.materials.images import load_texture
 
         reading = _reading(self._options)

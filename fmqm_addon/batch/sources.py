@@ -64,7 +64,7 @@ def lod_rows(path: str) -> list[Row]:
     Raises:
         FileError: it cannot be opened, or no names in it tell levels.
     """
-    from ..blender.files import chains_of_file
+    from ..blender.files.load import chains_of_file
 
     rows = []
     for name, levels in chains_of_file(path):

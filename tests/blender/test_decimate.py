@@ -13,10 +13,17 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+from fmqm_addon.blender.files.load.export import (
+    EXPORTERS,
+    file_reader,
+    open_asset,
+    save_version,
+    texture_sizes,
+    written_reader,
+)
+from fmqm_addon.blender.files.load.load import load_mesh
 
 from fmqm_addon import ui
-from fmqm_addon.blender.files import load_mesh
-from fmqm_addon.blender.reduced import EXPORTERS, file_reader, open_asset, save_version, texture_sizes, written_reader
 from fmqm_addon.blender.scene.decimate import (
     DECIMATE,
     LEAST_TRIANGLES,

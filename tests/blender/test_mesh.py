@@ -10,11 +10,11 @@ import bmesh
 import bpy
 import numpy as np
 import pytest
+from fmqm_addon.blender.files.load.flatten import make_plain
 from mathutils import Matrix
 
 from fmqm_addon.blender.materials.images import TextureCache
 from fmqm_addon.blender.materials.types import Reading
-from fmqm_addon.blender.plain import make_plain
 from fmqm_addon.blender.scene.bvh import BVHQuery
 from fmqm_addon.blender.scene.mesh_arrays import mesh_arrays, to_bake
 from fmqm_addon.metric.color import Texture

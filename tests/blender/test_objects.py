@@ -11,12 +11,12 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+from fmqm_addon.blender.files.load.load import load_mesh, load_placed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mathutils import Euler, Matrix, Vector
 
 from fmqm_addon.blender import bake, mesh
-from fmqm_addon.blender.files import load_mesh, load_placed
 from fmqm_addon.blender.materials.types import Reading
 from fmqm_addon.blender.scene.evaluated import evaluated
 from fmqm_addon.blender.scene.measure import measuring

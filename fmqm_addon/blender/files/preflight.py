@@ -12,9 +12,9 @@ from urllib.parse import quote
 
 import numpy as np
 
-from ..metric.errors import FileError
-from .materials.image_headers import file_header
-from .materials.images import crashes
+from ...metric.errors import FileError
+from ..materials.image_headers import file_header
+from ..materials.images import crashes
 
 _COUNT = re.compile(rb"-?0*\d{1,9}")  # Blender would end the process at 2^31
 _JPEG_2000 = (".jp2", ".j2k", ".j2c", ".jpc")

@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..metric.errors import FileError
+from ...metric.errors import FileError
 
 _ASSET = re.compile("@([^@]+)@")  # in what USD says of a missing one, its name first, then that of who asks
 _UNREAD = ("NurbsPatch", "HermiteCurves", "TetMesh", "Volume")  # kinds of prims that no mesh comes of

@@ -13,19 +13,19 @@ from pathlib import Path
 
 import bpy
 
-from ..comparison.alignment import Placed
-from ..metric.errors import FileError, FMQMError, MeshError, one_line
-from ..metric.surface import MeshArrays
-from .materials.images import TextureCache
-from .materials.types import Reading
-from .remarks import left_out
-from .scene.lods import find_chains
-from .scene.members import check_instances, check_object, scene_members
-from .scene.mesh_arrays import AS_FOUND, to_bake
-from .scene.target import placed
-from .spec import SUFFIXES, split_spec
-from .truncated import check_alembic, check_beside, check_ply
-from .usd import check_usd
+from ...comparison.alignment import Placed
+from ...metric.errors import FileError, FMQMError, MeshError, one_line
+from ...metric.surface import MeshArrays
+from ..materials.images import TextureCache
+from ..materials.types import Reading
+from ..scene.lods import find_chains
+from ..scene.members import check_instances, check_object, scene_members
+from ..scene.mesh_arrays import AS_FOUND, to_bake
+from ..scene.target import placed
+from .asset_path import SUFFIXES, split_spec
+from .import_warnings import left_out
+from .preflight import check_alembic, check_beside, check_ply
+from .preflight_usd import check_usd
 
 
 def load_mesh(spec: str, reading: Reading = AS_FOUND) -> MeshArrays:

@@ -10,8 +10,8 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from .scene.evaluated import Evaluated, Shown, evaluated, shown
-from .scene.mesh_arrays import slot_materials
+from ..scene.evaluated import Evaluated, Shown, evaluated, shown
+from ..scene.mesh_arrays import slot_materials
 
 _KEPT = ("EMPTY", "LIGHT", "CAMERA")  # beside what is measured
 _SHEARED = 1e-5  # of the longest axis; below it is rounding

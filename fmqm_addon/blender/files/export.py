@@ -13,13 +13,13 @@ from pathlib import Path
 
 import bpy
 
-from ..metric.errors import FileError, FMQMError, MeshError, SettingsError
-from ..metric.surface import MeshArrays
-from .files import last_line, load_mesh, open_file
-from .plain import ancestors, make_plain
-from .scene.decimate import Reader, Version, add_modifiers, scene_reader
-from .scene.members import instanced, scene_members
-from .spec import split_spec
+from ...metric.errors import FileError, FMQMError, MeshError, SettingsError
+from ...metric.surface import MeshArrays
+from ..scene.decimate import Reader, Version, add_modifiers, scene_reader
+from ..scene.members import instanced, scene_members
+from .asset_path import split_spec
+from .flatten import ancestors, make_plain
+from .load import last_line, load_mesh, open_file
 
 NOT_COLOR = "Non-Color"
 _ENDINGS = {"JPEG": ".jpg", "TARGA": ".tga", "TARGA_RAW": ".tga", "OPEN_EXR": ".exr", "TIFF": ".tif"}
