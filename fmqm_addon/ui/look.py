@@ -18,7 +18,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from ..blender import pointcloud
+from ..blender.display import scene_objects as pointcloud
 from ..metric.errors import FMQMError
 from ..report import layers
 from . import overlay, properties, session, show

@@ -18,7 +18,7 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 from numpy.typing import NDArray
 
-from ..blender import pointcloud
+from ..blender.display import scene_objects as pointcloud
 from ..metric.spatial import Floats
 from . import session
 from .properties import active_row

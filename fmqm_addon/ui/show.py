@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Puts what is remembered of a result row into the scene: between the session's arrays and blender.pointcloud."""
+"""Puts what is remembered of a result row into the scene: between the session's arrays and blender.display.scene_objects."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
-from ..blender import pointcloud, viewport
+from ..blender.display import scene_objects as pointcloud
+from ..blender.display import viewport
 from ..metric.errors import FMQMError
 from ..metric.fields import Fields
 from ..metric.score import Result

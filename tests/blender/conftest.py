@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from fmqm_addon.blender import viewport
+from fmqm_addon.blender.display import viewport
 
 from . import scenes
 

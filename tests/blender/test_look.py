@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 import fmqm_addon
-from fmqm_addon.blender import pointcloud, viewport
+from fmqm_addon.blender.display import scene_objects as pointcloud
+from fmqm_addon.blender.display import viewport
 from fmqm_addon.blender.scene.mesh_arrays import mesh_arrays
 from fmqm_addon.comparison.measurement import Comparison, Measurement
 from fmqm_addon.metric.color import decode_srgb, srgb_to_lab

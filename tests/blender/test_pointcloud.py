@@ -7,7 +7,8 @@ import bpy
 import numpy as np
 import pytest
 
-from fmqm_addon.blender import pointcloud, viewport
+from fmqm_addon.blender.display import scene_objects as pointcloud
+from fmqm_addon.blender.display import viewport
 from fmqm_addon.metric.color import decode_srgb
 
 from . import scenes
