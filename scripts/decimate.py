@@ -120,7 +120,7 @@ def _search(args: argparse.Namespace, targets: list[float], settings: Settings, 
     )
 
     from fmqm_addon.blender.scene.decimate import Wish, reducing
-    from fmqm_addon.report.files import check_writable, print_parts, write_text
+    from fmqm_addon.report.atomic_files import check_writable, print_parts, write_text
 
     outputs = _output_names(args.output, targets if args.chain else [])
     for path in outputs:

@@ -35,12 +35,12 @@ from fmqm_addon.blender.process import FAILED, OK, WRONG_ARGUMENTS, blender_vers
 from fmqm_addon.comparison.alignment import SPACES
 from fmqm_addon.metric.errors import FileError, FMQMError, SettingsError
 from fmqm_addon.metric.settings import CENTERS, COLOR_SPACES, POOLINGS, PRESETS, SETTING_NAMES, Settings
+from fmqm_addon.report.atomic_files import STDOUT, check_apart, check_writable, print_parts, write_parts
 from fmqm_addon.report.explain import explain
-from fmqm_addon.report.files import STDOUT, check_apart, check_writable, print_parts, write_parts
+from fmqm_addon.report.html.page import PAGE, write_page
+from fmqm_addon.report.html.pictures import has_pictures, open_report_folder
 from fmqm_addon.report.junit import below, junit_parts, shortfall
-from fmqm_addon.report.page import PAGE, write_page
-from fmqm_addon.report.pair import csv_parts, json_parts, table_parts, trust_parts
-from fmqm_addon.report.pair_pictures import has_pictures, open_report_folder
+from fmqm_addon.report.records import csv_parts, json_parts, table_parts, trust_parts
 
 if TYPE_CHECKING:
     from fmqm_addon.comparison.pair import Answer
@@ -434,8 +434,8 @@ def _write(
 
 
 def _write_last(args: argparse.Namespace, last: Answer) -> None:
-    from fmqm_addon.report.fields import save_fields
-    from fmqm_addon.report.picture import write_picture
+    from fmqm_addon.report.npz import save_fields
+    from fmqm_addon.report.render import write_picture
 
     result = last.comparison.result
     if args.save_fields:

@@ -21,7 +21,7 @@ except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
 from ..metric.errors import FileError, SettingsError
-from ..report.pair import RECORD_KEYS
+from ..report.records import RECORD_KEYS
 from .rows import Options, Row
 
 _BEGINNINGS = (b'{"start": "', b'{"done": "')  # of a line

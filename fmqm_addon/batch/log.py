@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..metric.errors import FileError, one_line
-from ..report.files import print_parts
+from ..report.atomic_files import print_parts
 
 
 class Log:

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from ..metric.errors import FileError
-from ..report.pair import RECORD_KEYS
+from ..report.records import RECORD_KEYS
 from .journal import Journal
 from .log import Log
 from .rows import Row

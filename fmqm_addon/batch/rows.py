@@ -10,7 +10,7 @@ from typing import Any
 
 from ..blender.files.asset_path import split_spec
 from ..metric.settings import Settings
-from ..report.pair import PairScore, pair_record
+from ..report.records import PairScore, pair_record
 
 
 @dataclass(frozen=True)

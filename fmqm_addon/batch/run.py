@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from ..blender.process import stops_wait
 from ..metric.errors import FMQMError, ImageMissingError, ImageSizeError, OutputError, one_line
 from ..report.explain import explain, where
-from ..report.pair import PairScore, pair_record
-from ..report.pair_pictures import picture_stem, write_pair_pictures
+from ..report.html.pictures import picture_stem, write_pair_pictures
+from ..report.records import PairScore, pair_record
 from .journal import Journal
 from .log import Log
 from .rows import Options, Row, Task, grouped, task_of
@@ -129,7 +129,7 @@ class _Scorer:
 
     def _compare(self, pair: PairScore, row: Row, reference: Placed, measurement: Measurement) -> PairScore:
         from ..comparison.pair import answering
-        from ..report.trust import trust_dict
+        from ..report.trust_table import trust_dict
 
         loaded = self._load(row, row.distorted, row.texture)
         answer = self._work(

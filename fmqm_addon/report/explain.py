@@ -82,7 +82,7 @@ def explain(record: Mapping[str, Any]) -> str:
     """One paragraph about a pair.
 
     Args:
-        record: as report.pair.pair_record has it; "where" and "attribution" are used where they are there.
+        record: as report.records.pair_record has it; "where" and "attribution" are used where they are there.
     """
     if record["error"] is not None:
         return f"Not scored: {record['error']}."

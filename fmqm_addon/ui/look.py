@@ -20,7 +20,7 @@ from bpy.props import (
 
 from ..blender.display import scene_objects as pointcloud
 from ..metric.errors import FMQMError
-from ..report import layers
+from ..report.visual import layers
 from . import overlay, properties, session, show
 
 PARENT = "FMQM_PT_main"

@@ -16,7 +16,7 @@ from ..blender.scene.target import Target, target_of
 from ..comparison.pair import Question
 from ..metric.errors import FMQMError
 from ..metric.score import Stepper
-from ..report.trust import trust_dict
+from ..report.trust_table import trust_dict
 from . import session, watch
 from .inputs import reference_of
 from .properties import PRESET_PROPERTIES, FMQMRow, item_target, metric_settings, numbers_text

@@ -23,7 +23,7 @@ from ..metric.spatial import Floats
 from . import session
 from .properties import active_row
 
-LEGEND = "fmqm_legend"  # custom property of the objects that have a legend: report.layers.Legend as JSON
+LEGEND = "fmqm_legend"  # custom property of the objects that have a legend: report.visual.layers.Legend as JSON
 _FONT = 0
 _MARGIN, _PAD, _LINE, _GAP = 14, 10, 17, 8  # pixels at a UI scale of 1
 _BAR_WIDTH, _BAR_HEIGHT, _TICK = 14, 150, 4

@@ -10,8 +10,8 @@ from bl_ui.utils import PresetPanel
 
 from ..comparison.alignment import PLACE_LABELS
 from ..metric.score import COLUMNS
-from ..report.pair import SHOWN
-from ..report.trust import Line, trust_lines
+from ..report.records import SHOWN
+from ..report.trust_table import Line, trust_lines
 from . import session
 from .measuring import why_not
 from .properties import (

@@ -16,9 +16,9 @@ from ..metric.errors import FMQMError
 from ..metric.score import COLUMNS
 from ..metric.settings import PRESETS, SETTING_NAMES, Settings
 from ..metric.spatial import Floats
-from ..report.fields import save_fields
-from ..report.files import write_text
-from ..report.pair import SHOWN, PairScore, csv_text, json_text, table_text
+from ..report.atomic_files import write_text
+from ..report.npz import save_fields
+from ..report.records import SHOWN, PairScore, csv_text, json_text, table_text
 from . import session, watch
 from .properties import FMQMRow, active_row, row_attribution, row_reverse, row_scores, row_stderr, row_trust
 

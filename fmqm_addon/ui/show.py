@@ -18,7 +18,7 @@ from ..metric.errors import FMQMError
 from ..metric.fields import Fields
 from ..metric.score import Result
 from ..metric.spatial import Floats, Ints, cross
-from ..report import layers, probe
+from ..report.visual import layers, probe
 from . import overlay, properties, session
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from fmqm_addon.batch.journal import Journal
 from fmqm_addon.batch.rows import task_of
 from fmqm_addon.batch.workers import end_with_parent, journal_of
-from fmqm_addon.report.pair import PairScore, pair_record
+from fmqm_addon.report.records import PairScore, pair_record
 
 shard = Path(sys.argv[-1])
 end_with_parent()

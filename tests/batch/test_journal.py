@@ -15,7 +15,7 @@ from fmqm_addon.batch.journal import Journal, Records, parse_line, row_key
 from fmqm_addon.batch.rows import Options, Row
 from fmqm_addon.metric.errors import FileError, SettingsError
 from fmqm_addon.metric.settings import Settings
-from fmqm_addon.report.pair import PairScore, pair_record
+from fmqm_addon.report.records import PairScore, pair_record
 
 VERSIONS = {"fmqm_version": "1", "blender_version": "5"}
 OPTIONS = Options(Settings())

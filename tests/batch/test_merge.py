@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from fmqm_addon.report.pair import PairScore, pair_record
+from fmqm_addon.report.records import PairScore, pair_record
 from scripts.score import main
 
 HEAD = {"fmqm_version": "1", "blender_version": "4", "settings": {}}

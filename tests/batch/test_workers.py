@@ -20,7 +20,7 @@ from fmqm_addon.batch.log import Log
 from fmqm_addon.batch.rows import Row, Task
 from fmqm_addon.batch.workers import Limits, adopt, journal_of, score_with_workers
 from fmqm_addon.metric.errors import FileError, FMQMError
-from fmqm_addon.report.pair import PairScore, pair_record
+from fmqm_addon.report.records import PairScore, pair_record
 
 FAKE = Path(__file__).parent / "fake_worker.py"
 ROOT = Path(__file__).resolve().parents[2]

@@ -24,7 +24,7 @@ from fmqm_addon.metric.samples import Samples
 from fmqm_addon.metric.score import Result
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.spatial import dot
-from fmqm_addon.report import colormap, layers, probe
+from fmqm_addon.report.visual import colormap, layers, probe
 from fmqm_addon.ui import overlay, session, show
 
 from . import scenes

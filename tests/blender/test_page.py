@@ -20,11 +20,12 @@ from fmqm_addon.blender.scene.bvh import BVHQuery
 from fmqm_addon.metric.color import Material, PlainColor, Texture
 from fmqm_addon.metric.errors import FileError, FMQMError
 from fmqm_addon.metric.surface import MeshArrays, Surface, prepare_surface
-from fmqm_addon.report import pair_pictures, picture
-from fmqm_addon.report.curve import Level, curve_svg
-from fmqm_addon.report.page import page_parts, write_page
-from fmqm_addon.report.pair_pictures import open_report_folder, picture_stem, texture_bytes, write_pair_pictures
-from fmqm_addon.report.picture import Camera, is_seen, render
+from fmqm_addon.report import render as picture
+from fmqm_addon.report.html import pictures as pair_pictures
+from fmqm_addon.report.html.chain_curve import Level, curve_svg
+from fmqm_addon.report.html.page import page_parts, write_page
+from fmqm_addon.report.html.pictures import open_report_folder, picture_stem, texture_bytes, write_pair_pictures
+from fmqm_addon.report.render import Camera, is_seen, render
 
 from .script import COLUMNS, SMALL, noise, score, write_png, write_torus
 from .test_picture import FEW, RED, compared, hue

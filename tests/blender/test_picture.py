@@ -15,8 +15,8 @@ from fmqm_addon.metric.errors import FileError, FMQMError
 from fmqm_addon.metric.score import COLUMNS, Evaluation, Result
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.surface import Frame, MeshArrays, Surface, prepare_surface
-from fmqm_addon.report import picture
-from fmqm_addon.report.picture import Camera, render, score_by_face, score_colors, write_picture
+from fmqm_addon.report import render as picture
+from fmqm_addon.report.render import Camera, render, score_by_face, score_colors, write_picture
 
 RED, GREEN, BLUE, YELLOW = (200, 20, 20), (20, 200, 20), (20, 20, 200), (200, 200, 20)
 FRONT = {"azimuth": 0.0, "elevation": 0.0}

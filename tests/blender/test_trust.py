@@ -21,7 +21,7 @@ from fmqm_addon.comparison.trust import Fact
 from fmqm_addon.metric.score import COLUMNS
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.surface import MeshArrays
-from fmqm_addon.report.trust import trust_dict
+from fmqm_addon.report.trust_table import trust_dict
 from fmqm_addon.ui import panels
 from fmqm_addon.ui.properties import row_reverse, row_trust
 from fmqm_addon.ui.results import pair_of

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from fmqm_addon.metric.errors import FileError, SettingsError
-from fmqm_addon.report.files import check_apart, check_writable, write_text
+from fmqm_addon.report.atomic_files import check_apart, check_writable, write_text
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")

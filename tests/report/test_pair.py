@@ -6,7 +6,7 @@ from __future__ import annotations
 import csv
 import io
 
-from fmqm_addon.report.pair import PairScore, csv_text
+from fmqm_addon.report.records import PairScore, csv_text
 
 
 def test_names_with_breaks_come_back() -> None:

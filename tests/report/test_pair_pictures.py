@@ -15,7 +15,7 @@ from fmqm_addon.batch.log import Log
 from fmqm_addon.batch.rows import Options, Row, Task
 from fmqm_addon.metric.errors import MeshError, OutputError
 from fmqm_addon.metric.settings import Settings
-from fmqm_addon.report.pair_pictures import _write
+from fmqm_addon.report.html.pictures import _write
 
 
 def test_a_picture_that_cannot_be_written_is_an_output_error(tmp_path: Path) -> None:

@@ -77,7 +77,7 @@ def saturated(picture: Pixels) -> int:
 
 
 def test_points_show_in_solid_shading(pictures: dict[str, Pixels]) -> None:
-    from fmqm_addon.report.colormap import score_colors
+    from fmqm_addon.report.visual.colormap import score_colors
 
     before, shown = center(pictures["before"]), center(pictures["look"])
     assert saturated(shown) > saturated(before) + 5_000

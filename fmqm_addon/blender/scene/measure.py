@@ -30,7 +30,7 @@ class Outcome:
         reference_target, target: what was asked for.
         answer: None where there is an error.
         triangles, reference_triangles: counts after triangulation, before anything is left out.
-        seconds: by report.pair.STAGES; reading and preparing the reference count in the first outcome.
+        seconds: by report.records.STAGES; reading and preparing the reference count in the first outcome.
         fingerprint: of reference and compared, as they were when they were read.
         error: why there is no score.
     """

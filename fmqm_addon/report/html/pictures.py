@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..metric.color import Texture
-from ..metric.errors import FileError, OutputError
-from ..metric.score import Result
-from ..metric.surface import Surface
-from .files import check_writable, replaced
-from .picture import (
+from ...metric.color import Texture
+from ...metric.errors import FileError, OutputError
+from ...metric.score import Result
+from ...metric.surface import Surface
+from ..atomic_files import check_writable, replaced
+from ..render import (
     Camera,
     Pixels,
     is_seen,
@@ -29,7 +29,7 @@ from .picture import (
     score_by_face,
     three_views,
 )
-from .probe import patch_view, worst_patches
+from ..visual.probe import patch_view, worst_patches
 
 PICTURES = "pictures"  # the folder beside the page
 VIEW_AREA = 560**2  # pixels of a view of the whole

@@ -18,7 +18,7 @@ import numpy as np
 from ..metric.errors import one_line
 from ..metric.score import COLUMNS
 from ..metric.spatial import Floats
-from .trust import Report, trust_text
+from .trust_table import Report, trust_text
 
 SHOWN = ("FMQM", *(name for name in COLUMNS if name != "FMQM"))  # the score first, then its features
 STAGES = ("load", "prepare", "fields", "features", "total")
@@ -38,7 +38,7 @@ class PairScore:
         error: why there are no scores.
         space: where the two were compared, as comparison.alignment.Placement.label has it.
         reverse: (5,) scores of the other direction, the distorted mesh as the reference; None: not asked for.
-        trust: as report.trust.trust_dict has it.
+        trust: as report.trust_table.trust_dict has it.
         findings: what else was asked for, by its key in the record: where, attribution, pictures.
     """
 

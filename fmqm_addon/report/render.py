@@ -18,9 +18,9 @@ from ..metric.errors import FMQMError
 from ..metric.score import COLUMNS, Result
 from ..metric.spatial import Floats, Ints, closest_on_triangles, dot
 from ..metric.surface import Surface, triangle_normals
-from .colormap import NO_PATCH, score_colors
-from .files import replaced
-from .probe import plane_axes
+from .atomic_files import replaced
+from .visual.colormap import NO_PATCH, score_colors
+from .visual.probe import plane_axes
 
 if TYPE_CHECKING:
     from PIL.Image import Image

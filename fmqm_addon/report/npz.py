@@ -8,7 +8,7 @@ import json
 import numpy as np
 
 from ..metric.score import Result
-from .files import replaced
+from .atomic_files import replaced
 
 
 def save_fields(path: str, result: Result) -> None:

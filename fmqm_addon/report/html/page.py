@@ -16,13 +16,13 @@ from urllib.parse import quote
 
 import numpy as np
 
-from ..metric.spatial import Floats
-from .colormap import NO_PATCH, score_colors
-from .curve import Level, curve_svg
-from .files import write_parts
-from .junit import below
-from .pair import SHOWN
-from .trust import Report, trust_lines
+from ...metric.spatial import Floats
+from ..atomic_files import write_parts
+from ..junit import below
+from ..records import SHOWN
+from ..trust_table import Report, trust_lines
+from ..visual.colormap import NO_PATCH, score_colors
+from .chain_curve import Level, curve_svg
 
 PAGE = "index.html"
 MEGABYTE = 2**20
