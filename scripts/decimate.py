@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from fmqm_addon.batch.log import Log
-from fmqm_addon.blender.process import FAILED, OK, require_bpy, run_script
+from fmqm_addon.batch.progress_log import Log
+from fmqm_addon.cli.process import FAILED, OK, require_bpy, run_script
 from fmqm_addon.metric.errors import FMQMError, SettingsError, one_line
 from fmqm_addon.metric.settings import PRESETS, Settings
 from scripts.score import OneLineParser

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from fmqm_addon.blender.process import require_bpy, take_stdout
+from fmqm_addon.cli.process import require_bpy, take_stdout
 from fmqm_addon.metric.errors import FMQMError
 
 try:

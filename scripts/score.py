@@ -24,14 +24,14 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from fmqm_addon import VERSION
 from fmqm_addon.batch.cluster import score_on_cluster
 from fmqm_addon.batch.journal import Journal, Records, row_key
-from fmqm_addon.batch.log import Log
+from fmqm_addon.batch.manifest import glob_files, lod_rows, plain_rows, read_manifest
 from fmqm_addon.batch.merge import Merged
+from fmqm_addon.batch.progress_log import Log
 from fmqm_addon.batch.rows import Options, Row, Task
-from fmqm_addon.batch.run import score_tasks, units_of, work_off
-from fmqm_addon.batch.sources import glob_files, lod_rows, plain_rows, read_manifest
+from fmqm_addon.batch.scorer import score_tasks, units_of, work_off
 from fmqm_addon.batch.workers import Limits, adopt, score_with_workers, workers_command
 from fmqm_addon.blender.materials.types import MAX_BAKE
-from fmqm_addon.blender.process import FAILED, OK, WRONG_ARGUMENTS, blender_version, require_bpy, run_script
+from fmqm_addon.cli.process import FAILED, OK, WRONG_ARGUMENTS, blender_version, require_bpy, run_script
 from fmqm_addon.comparison.alignment import SPACES
 from fmqm_addon.metric.errors import FileError, FMQMError, SettingsError
 from fmqm_addon.metric.settings import CENTERS, COLOR_SPACES, POOLINGS, PRESETS, SETTING_NAMES, Settings

@@ -12,7 +12,7 @@ from typing import Any
 
 from ..metric.errors import FMQMError
 from .journal import Journal
-from .log import Log
+from .progress_log import Log
 from .rows import Task, grouped, task_of
 from .workers import Limits, score_with_workers, workers_command
 

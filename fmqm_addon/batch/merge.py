@@ -10,7 +10,7 @@ from typing import Any
 from ..metric.errors import FileError
 from ..report.records import RECORD_KEYS
 from .journal import Journal
-from .log import Log
+from .progress_log import Log
 from .rows import Row
 
 _KEYS = RECORD_KEYS | {"settings", "fail_under"}

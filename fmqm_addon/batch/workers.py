@@ -23,10 +23,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..blender.process import stops_wait
+from ..cli.process import stops_wait
 from ..metric.errors import FileError, FMQMError
 from .journal import Journal, parse_line
-from .log import Log
+from .progress_log import Log
 from .rows import Task, grouped
 
 TRIES = 2  # a pair that ends its worker is tried once more

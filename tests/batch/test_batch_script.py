@@ -19,9 +19,9 @@ from xml.etree import ElementTree
 import pytest
 
 from fmqm_addon.batch.journal import Journal
-from fmqm_addon.batch.log import Log
+from fmqm_addon.batch.progress_log import Log
 from fmqm_addon.batch.rows import Options, Row, Task
-from fmqm_addon.batch.run import score_tasks
+from fmqm_addon.batch.scorer import score_tasks
 from fmqm_addon.metric.settings import Settings
 from tests.blender.script import (
     COLUMNS,

@@ -113,7 +113,7 @@ def test_shards_know_their_places_and_which_is_missing(tmp_path: Path, capsys: p
 def test_the_unforeseen_ends_with_1() -> None:
     """Under Blender too, which would go on after an exception that leaves the script."""
     code = (
-        "from fmqm_addon.blender.process import run_script\n"
+        "from fmqm_addon.cli.process import run_script\n"
         "def fail(*_):\n    raise RuntimeError('unforeseen')\n"
         "try:\n    run_script(fail, __name__)\nexcept Exception:\n    pass\n"
     )

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
+from fmqm_addon.batch.manifest import glob_files, plain_rows, read_manifest
 from fmqm_addon.batch.rows import Options, Row, Task, grouped, task_of
-from fmqm_addon.batch.sources import glob_files, plain_rows, read_manifest
 from fmqm_addon.metric.errors import FileError, FMQMError, SettingsError
 from fmqm_addon.metric.settings import Settings
 

@@ -16,7 +16,7 @@ import pytest
 
 from fmqm_addon.batch import workers
 from fmqm_addon.batch.journal import Journal, parse_line
-from fmqm_addon.batch.log import Log
+from fmqm_addon.batch.progress_log import Log
 from fmqm_addon.batch.rows import Row, Task
 from fmqm_addon.batch.workers import Limits, adopt, journal_of, score_with_workers
 from fmqm_addon.metric.errors import FileError, FMQMError
@@ -168,7 +168,7 @@ PARENT = """
 import sys
 from pathlib import Path
 sys.path.insert(0, sys.argv[1])
-from fmqm_addon.blender.process import stop_on_signals
+from fmqm_addon.cli.process import stop_on_signals
 from tests.batch.test_workers import tasks_of, watch
 stop_on_signals()  # as score.py
 try:

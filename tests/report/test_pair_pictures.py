@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fmqm_addon.batch import run
+from fmqm_addon.batch import scorer as run
 from fmqm_addon.batch.journal import Journal
-from fmqm_addon.batch.log import Log
+from fmqm_addon.batch.progress_log import Log
 from fmqm_addon.batch.rows import Options, Row, Task
 from fmqm_addon.metric.errors import MeshError, OutputError
 from fmqm_addon.metric.settings import Settings

@@ -10,13 +10,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from ..blender.process import stops_wait
+from ..cli.process import stops_wait
 from ..metric.errors import FMQMError, ImageMissingError, ImageSizeError, OutputError, one_line
 from ..report.explain import explain, where
 from ..report.html.pictures import picture_stem, write_pair_pictures
 from ..report.records import PairScore, pair_record
 from .journal import Journal
-from .log import Log
+from .progress_log import Log
 from .rows import Options, Row, Task, grouped, task_of
 from .workers import end_when_stuck, end_with_parent, journal_of
 
