@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import bpy
 
-from . import decimate, inputs, look, measuring, panels, properties, results, scene, watch
+from . import decimate, inputs, look, measuring, panels, properties, results, scene
+from . import stale as watch
 
 _look_groups = tuple(cls for cls in look.CLASSES if issubclass(cls, bpy.types.PropertyGroup))
 _look_rest = tuple(cls for cls in look.CLASSES if cls not in _look_groups)

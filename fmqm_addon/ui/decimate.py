@@ -24,8 +24,8 @@ from ..metric.errors import FMQMError
 from ..metric.score import Stepper, Work
 from ..metric.settings import Settings
 from . import session
+from .modal import SteppedOperator
 from .properties import metric_settings
-from .stepped import SteppedOperator
 
 
 class FMQMDecimate(bpy.types.PropertyGroup):

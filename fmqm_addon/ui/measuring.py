@@ -17,11 +17,12 @@ from ..comparison.pair import Question
 from ..metric.errors import FMQMError
 from ..metric.score import Stepper
 from ..report.trust_table import trust_dict
-from . import session, watch
+from . import session
+from . import stale as watch
 from .inputs import reference_of
+from .modal import SteppedOperator
 from .properties import PRESET_PROPERTIES, FMQMRow, item_target, metric_settings, numbers_text
 from .scene import FMQMScene
-from .stepped import SteppedOperator
 
 
 def why_not(fmqm: FMQMScene) -> str:

@@ -19,7 +19,8 @@ from ..metric.spatial import Floats
 from ..report.atomic_files import write_text
 from ..report.npz import save_fields
 from ..report.records import SHOWN, PairScore, csv_text, json_text, table_text
-from . import session, watch
+from . import session
+from . import stale as watch
 from .properties import FMQMRow, active_row, row_attribution, row_reverse, row_scores, row_stderr, row_trust
 
 # What an artist should know of each number: label, and what a low value looks like.

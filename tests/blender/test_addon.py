@@ -23,8 +23,8 @@ from fmqm_addon.metric.errors import SettingsError
 from fmqm_addon.metric.score import COLUMNS, Progress, Stepper, Work
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.ui import inputs, measuring, panels, results, session, watch
+from fmqm_addon.ui.modal import SteppedOperator
 from fmqm_addon.ui.properties import item_target, metric_settings, row_scores
-from fmqm_addon.ui.stepped import SteppedOperator
 
 from . import scenes
 from .script import read_json, score

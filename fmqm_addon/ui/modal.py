@@ -10,7 +10,8 @@ from typing import Any
 import bpy
 
 from ..metric.score import Stepper
-from . import session, watch
+from . import session
+from . import stale as watch
 
 SLICE = 0.035  # seconds of work per tick of the timer: the window stays smooth
 SHOWN_EVERY = 0.2  # seconds between redraws of the progress
