@@ -140,8 +140,7 @@ def run_batch(reference: str, distorted: str, pairs: int, jobs: int, flags: list
 
 def query_floor(reference: str, distorted: str, samples: str) -> None:
     """Prints the seconds of the plain loops on both surfaces, and the reference's triangles."""
-    from fmqm_addon.blender.files.load.load import load_mesh
-
+    from fmqm_addon.blender.files.load import load_mesh
     from fmqm_addon.blender.scene.bvh import BVHQuery
     from fmqm_addon.metric.score import Evaluation
     from fmqm_addon.metric.settings import Settings
@@ -224,7 +223,8 @@ def generate(wanted: str, path: str) -> None:
 def decimate(reference: str, path: str) -> None:
     """A decimated copy of each mesh, as .blend."""
     import bpy
-    from fmqm_addon.blender.files.load.load import open_file
+
+    from fmqm_addon.blender.files.load import open_file
 
     open_file(reference)
     meshes = [object_ for object_ in bpy.context.scene.objects if object_.type == "MESH"]

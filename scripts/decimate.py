@@ -110,7 +110,7 @@ def _targets(args: argparse.Namespace) -> list[float]:
 def _search(args: argparse.Namespace, targets: list[float], settings: Settings, log: Log, out: TextIO) -> int:
     """Searches, prints, writes; Blender is imported only once the arguments are known to be good."""
     require_bpy()
-    from fmqm_addon.blender.files.load.export import (
+    from fmqm_addon.blender.files.export import (
         check_ending,
         check_outputs,
         file_reader,
@@ -118,7 +118,6 @@ def _search(args: argparse.Namespace, targets: list[float], settings: Settings, 
         texture_sizes,
         written_reader,
     )
-
     from fmqm_addon.blender.scene.decimate import Wish, reducing
     from fmqm_addon.report.atomic_files import check_writable, print_parts, write_text
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from . import decimate, inputs, look, measuring, panels, properties, results, scene
-from . import stale as watch
+from . import decimate, inputs, look, measuring, panels, properties, results, scene, stale
 
 _look_groups = tuple(cls for cls in look.CLASSES if issubclass(cls, bpy.types.PropertyGroup))
 _look_rest = tuple(cls for cls in look.CLASSES if cls not in _look_groups)
@@ -31,14 +30,14 @@ def register() -> None:
         bpy.utils.register_class(cls)
     scene.register()
     measuring.register()
-    watch.register()
+    stale.register()
     look.register()
 
 
 def unregister() -> None:
     """The exact mirror of register."""
     look.unregister()
-    watch.unregister()
+    stale.unregister()
     measuring.unregister()
     scene.unregister()
     for cls in reversed(CLASSES):

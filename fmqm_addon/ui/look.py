@@ -18,7 +18,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from ..blender.display import scene_objects as pointcloud
+from ..blender.display import scene_objects
 from ..metric.errors import FMQMError
 from ..report.visual import layers
 from . import overlay, properties, session, show
@@ -47,7 +47,7 @@ def _draw_slice(look: FMQMLook, _: bpy.types.Context) -> None:
 
 
 def _rebuild_slice(look: FMQMLook, _: bpy.types.Context) -> None:
-    if pointcloud.find_object(look.id_data, pointcloud.SLICE) is not None:
+    if scene_objects.find_object(look.id_data, scene_objects.SLICE) is not None:
         _quietly(lambda: show.show_slice(look.id_data))
 
 
@@ -225,7 +225,7 @@ class FMQM_OT_worst_step(_Shows, bpy.types.Operator):  # noqa: N801
     def act(self, context: bpy.types.Context) -> None:
         look = show.look_of(context.scene)
         uid, _, _ = show.measured_row(context.scene)
-        if look.worst_uid != uid or pointcloud.find_object(context.scene, pointcloud.CLOUD) is None:
+        if look.worst_uid != uid or scene_objects.find_object(context.scene, scene_objects.CLOUD) is None:
             show.show_cloud(context.scene)
         if look.focused and look.worst:  # the first press shows the worst one
             show.choose_worst(look, (look.worst_index + self.step) % len(look.worst))
@@ -300,7 +300,7 @@ class FMQM_OT_unit_pick(bpy.types.Operator):  # noqa: N801
 
     def invoke(self, context: bpy.types.Context, _: bpy.types.Event) -> set[str]:
         self._area = context.area
-        if pointcloud.find_object(context.scene, pointcloud.CLOUD) is None:
+        if scene_objects.find_object(context.scene, scene_objects.CLOUD) is None:
             show.show_cloud(context.scene)
         context.window.cursor_modal_set("CROSSHAIR")
         context.workspace.status_text_set(_STATUS)

@@ -17,8 +17,7 @@ from ..comparison.pair import Question
 from ..metric.errors import FMQMError
 from ..metric.score import Stepper
 from ..report.trust_table import trust_dict
-from . import session
-from . import stale as watch
+from . import session, stale
 from .inputs import reference_of
 from .modal import SteppedOperator
 from .properties import PRESET_PROPERTIES, FMQMRow, item_target, metric_settings, numbers_text
@@ -98,7 +97,7 @@ class FMQM_OT_measure(SteppedOperator, bpy.types.Operator):  # noqa: N801
             self.report({"WARNING"}, f"{len(failed)} of {len(outcomes)} not measured: {failed[0].error}")
         else:
             self.report({"INFO"}, f"{len(outcomes)} measured in {total:.1f} s")
-        watch.redraw()
+        stale.redraw()
         return {"FINISHED"}
 
 
@@ -119,7 +118,7 @@ class FMQM_OT_cancel(bpy.types.Operator):  # noqa: N801
 
 
 def _row_key(row: FMQMRow) -> tuple[Target, Target]:
-    return watch.row_targets(row)
+    return stale.row_targets(row)
 
 
 def _write_row(fmqm: FMQMScene, outcome: Outcome, settings_text: str) -> None:

@@ -10,8 +10,7 @@ from typing import Any
 import bpy
 
 from ..metric.score import Stepper
-from . import session
-from . import stale as watch
+from . import session, stale
 
 SLICE = 0.035  # seconds of work per tick of the timer: the window stays smooth
 SHOWN_EVERY = 0.2  # seconds between redraws of the progress
@@ -61,8 +60,8 @@ class SteppedOperator:
             stepper.cancel()
             window_manager.event_timer_remove(timer)
             workspace.status_text_set(None)
-            watch.redraw()
-            watch.soon()
+            stale.redraw()
+            stale.soon()
 
         self._job = job = session.job = session.Job(stop)
         session.longest_tick = 0.0
@@ -113,4 +112,4 @@ class SteppedOperator:
             return
         self._shown, job.text = now, progress.stage
         context.workspace.status_text_set(f"FMQM: {job.text}, {100 * job.progress:.0f} %        Esc: Cancel")
-        watch.redraw()
+        stale.redraw()

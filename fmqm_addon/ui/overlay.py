@@ -18,7 +18,7 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 from numpy.typing import NDArray
 
-from ..blender.display import scene_objects as pointcloud
+from ..blender.display import scene_objects
 from ..metric.spatial import Floats
 from . import session
 from .properties import active_row
@@ -90,7 +90,7 @@ def legends() -> list[dict[str, Any]]:
     """The legends of our objects that this view shows."""
     space = bpy.context.space_data
     shown: list[dict[str, Any]] = []
-    for object_ in pointcloud.objects(bpy.context.scene):
+    for object_ in scene_objects.objects(bpy.context.scene):
         if LEGEND in object_ and object_.visible_get(viewport=space):
             legend = json.loads(object_[LEGEND])
             if legend not in shown:  # points and painted surface share theirs

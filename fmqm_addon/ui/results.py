@@ -19,8 +19,7 @@ from ..metric.spatial import Floats
 from ..report.atomic_files import write_text
 from ..report.npz import save_fields
 from ..report.records import SHOWN, PairScore, csv_text, json_text, table_text
-from . import session
-from . import stale as watch
+from . import session, stale
 from .properties import FMQMRow, active_row, row_attribution, row_reverse, row_scores, row_stderr, row_trust
 
 # What an artist should know of each number: label, and what a low value looks like.
@@ -68,7 +67,7 @@ def _settings_that_count(row: FMQMRow) -> dict[str, Any]:
 
 def pair_of(row: FMQMRow) -> PairScore:
     """A row as the reports want it."""
-    reference, target = watch.row_targets(row)
+    reference, target = stale.row_targets(row)
     attribution = row_attribution(row)
     return PairScore(
         reference=reference.label,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Puts what is remembered of a result row into the scene: between the session's arrays and blender.display.scene_objects."""
+"""Puts what is remembered of a result row into the scene."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
-from ..blender.display import scene_objects as pointcloud
-from ..blender.display import viewport
+from ..blender.display import scene_objects, viewport
 from ..metric.errors import FMQMError
 from ..metric.fields import Fields
 from ..metric.score import Result
@@ -72,13 +71,13 @@ def follow_row(scene: bpy.types.Scene) -> None:
         look.worst_uid = ""
     uid, _, measured = measured_row(scene)
     builders = {
-        pointcloud.CLOUD: _build_cloud,
-        pointcloud.PAINTED: _build_painted,
-        pointcloud.SHELLS: _build_shells,
-        pointcloud.SLICE: draw_slice,
+        scene_objects.CLOUD: _build_cloud,
+        scene_objects.PAINTED: _build_painted,
+        scene_objects.SHELLS: _build_shells,
+        scene_objects.SLICE: draw_slice,
     }
     for kind, build in builders.items():
-        shown = pointcloud.find_object(scene, kind)
+        shown = scene_objects.find_object(scene, kind)
         if shown is not None and shown.get(_UID) != uid:
             build(scene)
     _fill_worst(look, measured.comparison.result, uid)
@@ -87,8 +86,8 @@ def follow_row(scene: bpy.types.Scene) -> None:
 
 def move_shown(scene: bpy.types.Scene) -> None:
     """Moves what is shown to the place that the look says."""
-    for kind in (pointcloud.CLOUD, pointcloud.PAINTED, pointcloud.SHELLS):
-        shown = pointcloud.find_object(scene, kind)
+    for kind in (scene_objects.CLOUD, scene_objects.PAINTED, scene_objects.SHELLS):
+        shown = scene_objects.find_object(scene, kind)
         measured = _measured_of(shown)
         if shown is not None and measured is not None:
             shown.matrix_world = Matrix(cloud_matrix(measured, look_of(scene).place).tolist())
@@ -120,9 +119,9 @@ def _build_cloud(scene: bpy.types.Scene) -> bpy.types.Object:
     look = look_of(scene)
     result = measured.comparison.result
     spacing = float(np.sqrt(sum(patch.area for patch in result.patches) / len(result.samples.positions)))
-    cloud = pointcloud.build_cloud(
+    cloud = scene_objects.build_cloud(
         scene,
-        pointcloud.CLOUD,
+        scene_objects.CLOUD,
         "FMQM Cloud",
         result.samples.positions,
         _outwards(result),
@@ -139,7 +138,7 @@ def _build_cloud(scene: bpy.types.Scene) -> bpy.types.Object:
 
 def recolor_cloud(scene: bpy.types.Scene) -> None:
     """Gives the cloud the colors and the legend of the chosen layer, unless its samples are gone."""
-    cloud = pointcloud.find_object(scene, pointcloud.CLOUD)
+    cloud = scene_objects.find_object(scene, scene_objects.CLOUD)
     measured = _measured_of(cloud)
     if cloud is None or measured is None:
         return
@@ -147,15 +146,15 @@ def recolor_cloud(scene: bpy.types.Scene) -> None:
     result = measured.comparison.result
     length = world_length(measured)
     colors, ends = layers.sample_colors(result, look.layer, look.range == "FITTED", length)
-    pointcloud.recolor(cloud, colors)
+    scene_objects.recolor(cloud, colors)
     _explain(scene, cloud, look.layer, ends, result, measured.comparison.distorted.name)
     viewport.redraw()
 
 
 def resize_cloud(scene: bpy.types.Scene) -> None:
-    cloud = pointcloud.find_object(scene, pointcloud.CLOUD)
+    cloud = scene_objects.find_object(scene, scene_objects.CLOUD)
     if cloud is not None:
-        pointcloud.resize(cloud, look_of(scene).point_size * POINT * cloud.get(_SPACING, 0.0))
+        scene_objects.resize(cloud, look_of(scene).point_size * POINT * cloud.get(_SPACING, 0.0))
 
 
 def cloud_matrix(measured: session.Measured, place: str) -> Floats:
@@ -187,7 +186,7 @@ def _outwards(result: Result) -> Floats:
 
 def _appear(object_: bpy.types.Object) -> None:
     bpy.context.view_layer.update()
-    pointcloud.reveal(object_, bpy.context.view_layer)
+    scene_objects.reveal(object_, bpy.context.view_layer)
     viewport.show_in_local_views(object_)
 
 
@@ -232,9 +231,9 @@ def paint_surface(scene: bpy.types.Scene) -> None:
 def _build_painted(scene: bpy.types.Scene) -> bpy.types.Object:
     uid, _, measured = measured_row(scene)
     mesh = measured.comparison.result.patch_mesh
-    painted = pointcloud.build_surface(
+    painted = scene_objects.build_surface(
         scene,
-        pointcloud.PAINTED,
+        scene_objects.PAINTED,
         "FMQM Painted",
         mesh.vertices + LIFT * _vertex_normals(mesh.vertices, mesh.triangles),
         mesh.triangles,
@@ -247,7 +246,7 @@ def _build_painted(scene: bpy.types.Scene) -> bpy.types.Object:
 
 def recolor_painted(scene: bpy.types.Scene) -> None:
     """Gives the painted copy, if there is one, the colors and the legend of the chosen layer."""
-    painted = pointcloud.find_object(scene, pointcloud.PAINTED)
+    painted = scene_objects.find_object(scene, scene_objects.PAINTED)
     measured = _measured_of(painted)
     if painted is None or measured is None:
         return
@@ -260,7 +259,7 @@ def recolor_painted(scene: bpy.types.Scene) -> None:
         values = layers.field_values(look.layer, *_fields_of_vertices(painted[_UID], measured), length)
     fitted_to = layers.layer_values(result, look.layer) if layers.LAYERS[look.layer].per_patch else values
     ends = layers.value_range(look.layer, fitted_to, look.range == "FITTED", length)
-    pointcloud.recolor(painted, layers.layer_colors(look.layer, values, *ends))
+    scene_objects.recolor(painted, layers.layer_colors(look.layer, values, *ends))
     _explain(scene, painted, look.layer, ends, result, distorted.name)
     viewport.redraw()
 
@@ -298,7 +297,7 @@ def focus_patch(scene: bpy.types.Scene, area: bpy.types.Area | None) -> None:
     """
     look = look_of(scene)
     uid, _, measured = measured_row(scene)
-    cloud = pointcloud.find_object(scene, pointcloud.CLOUD)
+    cloud = scene_objects.find_object(scene, scene_objects.CLOUD)
     if cloud is None or cloud.get(_UID) != uid:
         cloud = show_cloud(scene)
     else:
@@ -308,7 +307,7 @@ def focus_patch(scene: bpy.types.Scene, area: bpy.types.Area | None) -> None:
     patch = look.worst[look.worst_index].patch
     result = measured.comparison.result
     size = look.point_size * POINT * cloud[_SPACING]
-    pointcloud.resize(cloud, size, result.samples.patch == patch)
+    scene_objects.resize(cloud, size, result.samples.patch == patch)
     look.focused = True
     center, diameter, normal = probe.patch_view(result, patch)
     matrix = cloud_matrix(measured, look.place)
@@ -325,10 +324,10 @@ def focus_patch(scene: bpy.types.Scene, area: bpy.types.Area | None) -> None:
 def show_all_patches(scene: bpy.types.Scene) -> None:
     look = look_of(scene)
     look.focused = False
-    cloud = pointcloud.find_object(scene, pointcloud.CLOUD)
+    cloud = scene_objects.find_object(scene, scene_objects.CLOUD)
     if cloud is not None:
         shown = np.ones(len(cloud.data.vertices) // 4, bool)
-        pointcloud.resize(cloud, look.point_size * POINT * cloud.get(_SPACING, 0.0), shown)
+        scene_objects.resize(cloud, look.point_size * POINT * cloud.get(_SPACING, 0.0), shown)
 
 
 def choose_worst(look: FMQMLook, index: int) -> None:
@@ -383,9 +382,9 @@ def _build_shells(scene: bpy.types.Scene) -> bpy.types.Object:
         shown = place <= 1 - shells.shell / probe.SHELLS
     colors = probe.fields_at(surface, shells.positions[shown]).ncf
     area = float(measured.comparison.result.patch_mesh.area)
-    object_ = pointcloud.build_cloud(
+    object_ = scene_objects.build_cloud(
         scene,
-        pointcloud.SHELLS,
+        scene_objects.SHELLS,
         "FMQM Shells",
         positions[shown],
         shells.normals[shown],
@@ -394,7 +393,7 @@ def _build_shells(scene: bpy.types.Scene) -> bpy.types.Object:
     )
     object_[_UID] = uid
     object_.hide_select = True
-    pointcloud.recolor(object_, colors.astype(np.float64))
+    scene_objects.recolor(object_, colors.astype(np.float64))
     step = world_length(measured) * look.shell_distance / 100
     legend = layers.Legend(
         f"{probe.SHELLS} Shells of {surface.name}",
@@ -419,7 +418,7 @@ def show_slice(scene: bpy.types.Scene) -> bpy.types.Object:
     matrix = np.eye(4)
     matrix[:3, :3] = side * np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])  # faces the front, -Y
     matrix[:3, 3] = (low + high) / 2
-    plane = pointcloud.build_slice(scene, "FMQM Slice", matrix, int(look_of(scene).slice_resolution))
+    plane = scene_objects.build_slice(scene, "FMQM Slice", matrix, int(look_of(scene).slice_resolution))
     _appear(plane)
     draw_slice(scene)
     return plane
@@ -431,7 +430,7 @@ def draw_slice(scene: bpy.types.Scene) -> None:
     Raises:
         FMQMError: nothing to show.
     """
-    plane = pointcloud.find_object(scene, pointcloud.SLICE)
+    plane = scene_objects.find_object(scene, scene_objects.SLICE)
     if plane is None:
         return
     uid, name, measured = measured_row(scene)
@@ -447,7 +446,7 @@ def draw_slice(scene: bpy.types.Scene) -> None:
     colors = layers.layer_colors(look.slice_layer, values, *ends).copy()
     cut = dist.sdf if look.slice_layer.endswith("COMPARED") else ref.sdf
     colors[_borders((cut < 0).reshape(resolution, resolution)).ravel()] = OUTLINE
-    pointcloud.draw_slice(plane, colors)
+    scene_objects.draw_slice(plane, colors)
     plane[_UID], plane[_SLICE_MATRIX] = uid, _flat(plane)
     which = "compared" if look.slice_layer.endswith("COMPARED") else "reference"
     _explain(scene, plane, look.slice_layer, ends, measured.comparison.result, name, f"dark line: {which}")
@@ -456,7 +455,7 @@ def draw_slice(scene: bpy.types.Scene) -> None:
 
 def slice_has_moved(scene: bpy.types.Scene) -> bool:
     """Whether the slice is elsewhere than where it was drawn; cheap enough for each drawing of the view."""
-    plane = pointcloud.find_object(scene, pointcloud.SLICE)
+    plane = scene_objects.find_object(scene, scene_objects.SLICE)
     return plane is not None and _SLICE_MATRIX in plane and list(plane[_SLICE_MATRIX]) != _flat(plane)
 
 
@@ -557,7 +556,7 @@ def clear() -> int:
     _painted_fields.clear()
     for scene in bpy.data.scenes:
         look_of(scene).focused = False
-    count = pointcloud.clear()
+    count = scene_objects.clear()
     viewport.restore_colors()
     viewport.redraw()
     return count
@@ -565,11 +564,11 @@ def clear() -> int:
 
 def settle_colors() -> None:
     """After undo and redo, which leave the views' settings as they are: these follow what is shown now."""
-    if not pointcloud.anything_colored():
+    if not scene_objects.anything_colored():
         viewport.restore_colors()
     elif not viewport.colors_changed():  # else they are what they were, but for what the user has chosen since
         viewport.show_colors()
 
 
 def anything() -> bool:
-    return overlay.figure is not None or pointcloud.anything() or viewport.colors_changed()
+    return overlay.figure is not None or scene_objects.anything() or viewport.colors_changed()

@@ -179,7 +179,7 @@ def test_what_nobody_has_foreseen_is_an_error_of_its_pair(
 ) -> None:
     """Also where it comes with the reference; the others are scored."""
     pytest.importorskip("bpy")
-    from fmqm_addon.blender.files.load import load as files
+    from fmqm_addon.blender.files import load as files
 
     load = files.load_placed
 

@@ -16,13 +16,12 @@ import pytest
 
 import fmqm_addon
 from fmqm_addon import api, ui
-from fmqm_addon.blender.scene import measure as job
-from fmqm_addon.blender.scene import target as snapshot
+from fmqm_addon.blender.scene import measure, target
 from fmqm_addon.blender.scene.target import target_of
 from fmqm_addon.metric.errors import SettingsError
 from fmqm_addon.metric.score import COLUMNS, Progress, Stepper, Work
 from fmqm_addon.metric.settings import Settings
-from fmqm_addon.ui import inputs, measuring, panels, results, session, watch
+from fmqm_addon.ui import inputs, measuring, panels, results, session, stale
 from fmqm_addon.ui.modal import SteppedOperator
 from fmqm_addon.ui.properties import item_target, metric_settings, row_scores
 
@@ -344,13 +343,13 @@ def test_rows_that_are_out_of_date(
     bpy.ops.fmqm.measure()
     change(lods)  # type: ignore[operator]
     bpy.context.view_layer.update()
-    watch.check(bpy.context.scene)
+    stale.check(bpy.context.scene)
     assert {row.name for row in fmqm.rows if row.uid in session.stale} == (stale or set())
 
 
 def stale_names(fmqm: ui.scene.FMQMScene) -> set[str]:
     bpy.context.view_layer.update()
-    watch.check(bpy.context.scene)
+    stale.check(bpy.context.scene)
     return {row.name for row in fmqm.rows if row.uid in session.stale}
 
 
@@ -383,7 +382,7 @@ def test_painting_of_large_images_marks(
     fmqm: ui.scene.FMQMScene, lods: list[bpy.types.Object], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Without a look at all their pixels."""
-    monkeypatch.setattr(snapshot, "_MOST_PAINTED", 32 * 32 * 4 - 1)
+    monkeypatch.setattr(target, "_MOST_PAINTED", 32 * 32 * 4 - 1)
     lods[1].data.materials[0] = scenes.textured(scenes.write_png(tmp_path / "own.png", scenes.noise(32)))
     image = bpy.data.images["own.png"]
     compare(lods[0], lods[1])
@@ -488,7 +487,7 @@ def test_deleted_objects_are_gone_and_let_go_of(fmqm: ui.scene.FMQMScene, lods: 
     select(lods[0])
     bpy.ops.object.delete()
     assert why_not().endswith("Rock_LOD0 is gone; choose another reference")
-    watch.forget_deleted(bpy.context.scene)
+    stale.forget_deleted(bpy.context.scene)
     assert fmqm.reference is None and [item.object for item in fmqm.compared] == [None, None]
     assert [item.name for item in fmqm.compared] == ["Rock_LOD1", "Rock_LOD2"]
     assert not any(object_.users for object_ in bpy.data.objects if object_.name.startswith("Rock"))
@@ -500,7 +499,7 @@ def test_scores_stay_where_an_object_is_deleted_while_it_is_measured(
     compare(lods[0], *lods[1:])
     bpy.ops.fmqm.measure()
     before = [row.scores for row in fmqm.rows]
-    error = job.Outcome(target_of(lods[0]), target_of(lods[2]), error="why")
+    error = measure.Outcome(target_of(lods[0]), target_of(lods[2]), error="why")
     bpy.data.objects.remove(lods[2])
     measuring._write_row(fmqm, error, "{}")
     assert [row.scores for row in fmqm.rows] == before and not fmqm.rows[1].error
@@ -572,7 +571,7 @@ def test_rows_at_other_settings_are_told_apart(fmqm: ui.scene.FMQMScene, lods: l
         fmqm.settings.preset, fmqm.settings.seed = preset, seed
         if preset == "CUSTOM":
             fmqm.settings.samples = QUICK.samples
-        outcome = job.Outcome(target_of(lods[0]), target_of(lod))
+        outcome = measure.Outcome(target_of(lods[0]), target_of(lod))
         measuring._write_row(fmqm, outcome, json.dumps(metric_settings(fmqm.settings).as_dict()))
         rows.append(fmqm.rows[len(rows)])
     assert [results.settings_name(row) for row in rows] == ["Fast", "Fast", "Custom"]

@@ -11,10 +11,10 @@ from unittest.mock import MagicMock
 import bpy
 import numpy as np
 import pytest
-from fmqm_addon.blender.files.load.load import load_mesh
 
 import fmqm_addon
 from fmqm_addon import api
+from fmqm_addon.blender.files.load import load_mesh
 from fmqm_addon.blender.scene.measure import measuring
 from fmqm_addon.blender.scene.target import target_of
 from fmqm_addon.comparison.attribution import Attribution, attribute

@@ -13,7 +13,9 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from fmqm_addon.blender.files.load.export import (
+
+from fmqm_addon import ui
+from fmqm_addon.blender.files.export import (
     EXPORTERS,
     file_reader,
     open_asset,
@@ -21,9 +23,7 @@ from fmqm_addon.blender.files.load.export import (
     texture_sizes,
     written_reader,
 )
-from fmqm_addon.blender.files.load.load import load_mesh
-
-from fmqm_addon import ui
+from fmqm_addon.blender.files.load import load_mesh
 from fmqm_addon.blender.scene.decimate import (
     DECIMATE,
     LEAST_TRIANGLES,

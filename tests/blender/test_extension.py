@@ -104,7 +104,7 @@ def test_what_is_in_it(package: Path) -> None:
     assert {"__init__.py", "blender_manifest.toml", "README.md", "LICENSE"} <= set(names)
     code = {str(path.relative_to(ROOT)) for path in (ROOT / "fmqm_addon").rglob("*.py") if path.parent.name != "batch"}
     assert {name for name in names if name.endswith(".py")} == {"__init__.py", *code}
-    assert {"fmqm_addon/report/page.css", "fmqm_addon/report/page.js"} <= set(names)
+    assert {"fmqm_addon/report/html/page.css", "fmqm_addon/report/html/page.js"} <= set(names)
     for name in names:
         assert not name.startswith((".", "tests", "scripts", "out", "dist", "docs")) and "__pycache__" not in name
     for name in code:  # what Blender's reviewers refuse

@@ -12,9 +12,9 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from fmqm_addon.blender.files.load.load import SUFFIXES, load_mesh, split_spec
 
-from fmqm_addon.blender.files.load import load as files
+from fmqm_addon.blender.files import load as files
+from fmqm_addon.blender.files.load import SUFFIXES, load_mesh, split_spec
 from fmqm_addon.blender.materials.types import Reading
 from fmqm_addon.comparison.measurement import Measurement
 from fmqm_addon.metric.color import Texture

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import bpy
 import pytest
-from fmqm_addon.blender.files.load.load import SUFFIXES, load_placed
 
+from fmqm_addon.blender.files.load import SUFFIXES, load_placed
 from fmqm_addon.comparison.alignment import place
 from fmqm_addon.comparison.measurement import Measurement
 from fmqm_addon.metric.errors import FMQMError

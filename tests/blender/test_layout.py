@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fmqm_addon.blender.baking import atlas as layout
+from fmqm_addon.blender.baking import atlas
 from fmqm_addon.blender.baking.atlas import Layout, new_layout, own_layout
 from fmqm_addon.metric.color import Texture
 from fmqm_addon.metric.errors import MeshError
@@ -110,10 +110,10 @@ def test_image_grows_with_the_faces_and_has_an_end(monkeypatch: pytest.MonkeyPat
     vertices = np.random.default_rng(0).random((3 * count, 3))
     alone = np.full(count, -1)
     assert new_layout(vertices, triangles, triangles % 3, alone, 64).side == 256  # 2500 pairs of 4 x 4 pixels
-    monkeypatch.setattr(layout, "LARGEST", 128)
+    monkeypatch.setattr(atlas, "LARGEST", 128)
     tight = new_layout(vertices, triangles, triangles % 3, alone, 64)
     assert tight.side == 128 and len(np.unique(tight.corners[:, 0], axis=0)) == count
-    monkeypatch.setattr(layout, "LARGEST", 64)
+    monkeypatch.setattr(atlas, "LARGEST", 64)
     with pytest.raises(MeshError, match="2500 faces"):
         new_layout(vertices, triangles, triangles % 3, alone, 64)
 
@@ -172,4 +172,4 @@ def test_covered_pixels_are_counted(seed: int, count: int) -> None:
     """Random triangles have no pixel center on an edge: the naive count is exact."""
     uv = np.random.default_rng(seed).random((count, 3, 2)).astype(np.float32)
     naive = sum(inside(triangle.astype(float), 32).astype(int) for triangle in uv)
-    assert np.array_equal(layout._covered(uv, 32)[:, :32], naive)
+    assert np.array_equal(atlas._covered(uv, 32)[:, :32], naive)

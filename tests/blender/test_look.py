@@ -14,8 +14,7 @@ import numpy as np
 import pytest
 
 import fmqm_addon
-from fmqm_addon.blender.display import scene_objects as pointcloud
-from fmqm_addon.blender.display import viewport
+from fmqm_addon.blender.display import scene_objects, viewport
 from fmqm_addon.blender.scene.mesh_arrays import mesh_arrays
 from fmqm_addon.comparison.measurement import Comparison, Measurement
 from fmqm_addon.metric.color import decode_srgb, srgb_to_lab
@@ -70,15 +69,15 @@ def by_hand() -> tuple[Fields, Fields]:
 
 
 def legend() -> dict:
-    return json.loads(pointcloud.find_object(bpy.context.scene, pointcloud.CLOUD)[overlay.LEGEND])
+    return json.loads(scene_objects.find_object(bpy.context.scene, scene_objects.CLOUD)[overlay.LEGEND])
 
 
-def point_colors(kind: str = pointcloud.CLOUD) -> np.ndarray:
+def point_colors(kind: str = scene_objects.CLOUD) -> np.ndarray:
     """(N, 3) linear, of the first corner of each point."""
-    mesh = pointcloud.find_object(bpy.context.scene, kind).data
+    mesh = scene_objects.find_object(bpy.context.scene, kind).data
     values = np.empty(4 * len(mesh.vertices), np.float32)
-    mesh.attributes[pointcloud.COLOR].data.foreach_get("color", values)
-    return values.reshape(-1, 4)[:: 4 if kind == pointcloud.CLOUD else 1, :3]
+    mesh.attributes[scene_objects.COLOR].data.foreach_get("color", values)
+    return values.reshape(-1, 4)[:: 4 if kind == scene_objects.CLOUD else 1, :3]
 
 
 # --- Values and colors
@@ -210,7 +209,7 @@ def test_slice_points_are_the_centers_of_pixels() -> None:
 
 def test_cloud_is_at_the_reference_or_the_compared(scene: bpy.types.Scene, measured: session.Measured) -> None:
     bpy.ops.fmqm.look()
-    cloud = pointcloud.find_object(bpy.context.scene, pointcloud.CLOUD)
+    cloud = scene_objects.find_object(bpy.context.scene, scene_objects.CLOUD)
     result = measured.comparison.result
     world = result.frame.leave(result.samples.positions)
 
@@ -289,7 +288,7 @@ def test_worst_places_show_only_their_patch(scene: bpy.types.Scene, measured: se
     look, result = scene.fmqm.look, measured.comparison.result
 
     def shown() -> set[int]:
-        mesh = pointcloud.find_object(bpy.context.scene, pointcloud.CLOUD).data
+        mesh = scene_objects.find_object(bpy.context.scene, scene_objects.CLOUD).data
         values = np.empty(3 * len(mesh.vertices), np.float32)
         mesh.vertices.foreach_get("co", values)
         corners = values.reshape(-1, 4, 3)
@@ -314,7 +313,7 @@ def test_slice_shows_the_field_where_it_is(scene: bpy.types.Scene, measured: ses
     look = scene.fmqm.look
     look.slice_layer, look.slice_resolution = "NCF_REFERENCE", "128"
     bpy.ops.fmqm.slice()
-    plane = pointcloud.find_object(bpy.context.scene, pointcloud.SLICE)
+    plane = scene_objects.find_object(bpy.context.scene, scene_objects.SLICE)
 
     def pixels() -> np.ndarray:
         values = np.empty(128 * 128 * 4, np.float32)
@@ -345,7 +344,7 @@ def test_cloud_follows_the_chosen_row(scene: bpy.types.Scene, measured: session.
 
 
 def subtitle(kind: str) -> str:
-    return str(json.loads(pointcloud.find_object(bpy.context.scene, kind)[overlay.LEGEND])["subtitle"])
+    return str(json.loads(scene_objects.find_object(bpy.context.scene, kind)[overlay.LEGEND])["subtitle"])
 
 
 def add_row(scene: bpy.types.Scene, measured: session.Measured, name: str) -> None:
@@ -358,7 +357,7 @@ def add_row(scene: bpy.types.Scene, measured: session.Measured, name: str) -> No
     session.put(name, dataclasses.replace(measured, comparison=comparison))
 
 
-SHOWN = (pointcloud.CLOUD, pointcloud.PAINTED, pointcloud.SHELLS, pointcloud.SLICE)
+SHOWN = (scene_objects.CLOUD, scene_objects.PAINTED, scene_objects.SHELLS, scene_objects.SLICE)
 
 
 def show_all() -> None:
@@ -372,12 +371,12 @@ def test_all_follows_the_chosen_row(scene: bpy.types.Scene, measured: session.Me
     bpy.ops.fmqm.unit_step()
     add_row(scene, measured, "Other")
     scene.fmqm.row_index = 1
-    legends = [pointcloud.find_object(scene, kind)[overlay.LEGEND] for kind in SHOWN]
+    legends = [scene_objects.find_object(scene, kind)[overlay.LEGEND] for kind in SHOWN]
     assert all("Other" in text and "Monkey_LOD1" not in text for text in legends)
     assert overlay.figure is not None and overlay.figure.uid == "Other"
     scene.fmqm.rows.add().error = "broken"
     scene.fmqm.row_index = 2  # nothing to follow
-    assert legends == [pointcloud.find_object(scene, kind)[overlay.LEGEND] for kind in SHOWN]
+    assert legends == [scene_objects.find_object(scene, kind)[overlay.LEGEND] for kind in SHOWN]
 
 
 def test_all_but_the_slice_follows_the_place(scene: bpy.types.Scene) -> None:
@@ -386,7 +385,7 @@ def test_all_but_the_slice_follows_the_place(scene: bpy.types.Scene) -> None:
     lines = overlay.figure.lines
 
     def places() -> np.ndarray:
-        return np.array([pointcloud.find_object(scene, kind).location.x for kind in SHOWN])
+        return np.array([scene_objects.find_object(scene, kind).location.x for kind in SHOWN])
 
     before = places()
     scene.fmqm.look.place = "COMPARED"
@@ -412,22 +411,22 @@ def test_worst_places_are_the_chosen_rows(scene: bpy.types.Scene, measured: sess
 
 def test_each_scene_shows_its_own(scene: bpy.types.Scene, measured: session.Measured) -> None:
     show_all()
-    mine = [pointcloud.find_object(scene, kind) for kind in SHOWN]
+    mine = [scene_objects.find_object(scene, kind) for kind in SHOWN]
     two = bpy.data.scenes.new("Two")
     add_row(two, measured, "Other")
     show.show_cloud(two)
     show.show_slice(two)
-    assert [pointcloud.find_object(scene, kind) for kind in SHOWN] == mine and subtitle(SHOWN[0]) == "Monkey_LOD1"
-    theirs = list(pointcloud.objects(two))
+    assert [scene_objects.find_object(scene, kind) for kind in SHOWN] == mine and subtitle(SHOWN[0]) == "Monkey_LOD1"
+    theirs = list(scene_objects.objects(two))
     assert len(theirs) == 2 and not set(theirs) & set(mine)
     assert all(len(shown.users_scene) == 1 for shown in (*mine, *theirs))
     bpy.ops.fmqm.clear()
-    assert not pointcloud.anything()
+    assert not scene_objects.anything()
 
 
 def test_what_was_hidden_is_shown_when_asked_for(scene: bpy.types.Scene) -> None:
     bpy.ops.fmqm.look()
-    cloud = pointcloud.find_object(scene, pointcloud.CLOUD)
+    cloud = scene_objects.find_object(scene, scene_objects.CLOUD)
     (collection,) = cloud.users_collection
 
     def layer() -> bpy.types.LayerCollection:
@@ -461,10 +460,10 @@ def test_slice_is_in_the_saved_file(scene: bpy.types.Scene, tmp_path: Path) -> N
     bpy.ops.fmqm.slice()
 
     def pixels() -> list[float]:
-        return list(pointcloud.find_object(bpy.context.scene, pointcloud.SLICE).data.pixels)
+        return list(scene_objects.find_object(bpy.context.scene, scene_objects.SLICE).data.pixels)
 
     for height in (0.0, 0.3):  # a picture that was packed can be drawn again
-        pointcloud.find_object(scene, pointcloud.SLICE).location.z = height
+        scene_objects.find_object(scene, scene_objects.SLICE).location.z = height
         bpy.context.view_layer.update()
         show.draw_slice(scene)
         before = pixels()
@@ -478,10 +477,10 @@ def test_slice_is_in_the_saved_file(scene: bpy.types.Scene, tmp_path: Path) -> N
 
 def test_lengths_of_the_shells_have_the_scenes_unit(scene: bpy.types.Scene) -> None:
     bpy.ops.fmqm.shells()
-    assert subtitle(pointcloud.SHELLS).endswith(" cm apart")
+    assert subtitle(scene_objects.SHELLS).endswith(" cm apart")
     scene.unit_settings.system = "NONE"
     bpy.ops.fmqm.shells()
-    assert float(subtitle(pointcloud.SHELLS).removesuffix(" apart")) > 0
+    assert float(subtitle(scene_objects.SHELLS).removesuffix(" apart")) > 0
 
 
 def test_undo_takes_the_views_colors_along(scene: bpy.types.Scene) -> None:
@@ -496,7 +495,7 @@ def test_undo_takes_the_views_colors_along(scene: bpy.types.Scene) -> None:
     show.settle_colors()
     assert view.shading.color_type == "RANDOM"  # the user's choice
     view.shading.color_type = "VERTEX"
-    pointcloud.clear()  # as undo would
+    scene_objects.clear()  # as undo would
     show.settle_colors()
     assert view.shading.color_type == before and not viewport.colors_changed()
     show.show_cloud(scene)
@@ -517,7 +516,7 @@ def test_switched_off_it_leaves_nothing(scene: bpy.types.Scene) -> None:
     bpy.ops.fmqm.worst_step()
     fmqm_addon.unregister()
     try:
-        assert not pointcloud.anything() and not viewport.colors_changed() and overlay.figure is None
+        assert not scene_objects.anything() and not viewport.colors_changed() and overlay.figure is None
     finally:
         fmqm_addon.register()
     assert not bpy.context.scene.fmqm.look.focused

@@ -10,9 +10,9 @@ import bmesh
 import bpy
 import numpy as np
 import pytest
-from fmqm_addon.blender.files.load.flatten import make_plain
 from mathutils import Matrix
 
+from fmqm_addon.blender.files.flatten import make_plain
 from fmqm_addon.blender.materials.images import TextureCache
 from fmqm_addon.blender.materials.types import Reading
 from fmqm_addon.blender.scene.bvh import BVHQuery

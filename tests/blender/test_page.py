@@ -20,7 +20,7 @@ from fmqm_addon.blender.scene.bvh import BVHQuery
 from fmqm_addon.metric.color import Material, PlainColor, Texture
 from fmqm_addon.metric.errors import FileError, FMQMError
 from fmqm_addon.metric.surface import MeshArrays, Surface, prepare_surface
-from fmqm_addon.report import render as picture
+from fmqm_addon.report import render as rendering
 from fmqm_addon.report.html import pictures as pair_pictures
 from fmqm_addon.report.html.chain_curve import Level, curve_svg
 from fmqm_addon.report.html.page import page_parts, write_page
@@ -101,7 +101,7 @@ def test_pictures_of_a_pair(tmp_path: Path) -> None:
         with image.open(tmp_path / name) as decoded:
             size = tuple(made["size"]) if name in views else (pair_pictures.CLOSE_UP,) * 2
             assert decoded.format == "JPEG" and decoded.size == size
-            assert (np.abs(np.asarray(decoded).astype(int) - picture.BACKGROUND) > 40).any()
+            assert (np.abs(np.asarray(decoded).astype(int) - rendering.BACKGROUND) > 40).any()
     for patch in made["worst"]:  # all of the wall is seen
         assert all(0 < place < 1 for place in patch["at"])
 

@@ -11,9 +11,9 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from fmqm_addon.blender.files.load.load import load_mesh, open_file
 from mathutils import Matrix
 
+from fmqm_addon.blender.files.load import load_mesh, open_file
 from fmqm_addon.blender.materials.images import load_texture
 from fmqm_addon.blender.materials.types import Reading
 from fmqm_addon.blender.scene.members import scene_members

@@ -15,7 +15,7 @@ from fmqm_addon.metric.errors import FileError, FMQMError
 from fmqm_addon.metric.score import COLUMNS, Evaluation, Result
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.surface import Frame, MeshArrays, Surface, prepare_surface
-from fmqm_addon.report import render as picture
+from fmqm_addon.report import render as rendering
 from fmqm_addon.report.render import Camera, render, score_by_face, score_colors, write_picture
 
 RED, GREEN, BLUE, YELLOW = (200, 20, 20), (20, 200, 20), (20, 20, 200), (200, 200, 20)
@@ -62,7 +62,7 @@ def test_colors_stand_where_the_texture_says() -> None:
     assert image.shape == (60, 60, 3) and image.dtype == np.uint8
     for row, column, color in ((15, 15, RED), (15, 45, GREEN), (45, 15, BLUE), (45, 45, YELLOW)):
         assert hue(image[row, column]) == pytest.approx(hue(np.array(color)), abs=0.03)
-    assert (image[0] == picture.BACKGROUND).all() and (image[:, -1] == picture.BACKGROUND).all()
+    assert (image[0] == rendering.BACKGROUND).all() and (image[:, -1] == rendering.BACKGROUND).all()
     middle = image[30, 31]  # between yellow and green: the same red in both, or a mixture
     assert middle[1] > 100
 
@@ -79,7 +79,7 @@ def test_camera_holds_every_vertex_and_wastes_nothing() -> None:
     points = np.concatenate([reference.vertices, wall(1, reference.frame, width=3.0).vertices])
     local = (points - camera.eye) @ camera.axes.T
     seen = np.abs(local[:, :2] / local[:, 2:] / camera.half)
-    assert seen.max() == pytest.approx(1 / picture.MARGIN)
+    assert seen.max() == pytest.approx(1 / rendering.MARGIN)
     assert camera.axes @ camera.axes.T == pytest.approx(np.eye(3))
     assert camera.axes[1, 2] > 0.9  # Z is up
 
@@ -95,7 +95,7 @@ def test_faces_have_the_mean_of_their_patches_and_grey_without() -> None:
     assert 0 < np.isnan(scores).sum() < len(scores)
 
     image = render(reference, Camera.framing(reference, **FRONT), (60, 60), score_colors(scores))
-    assert hue(image[30, 30]) == pytest.approx(hue(np.array(picture.NO_PATCH)), abs=0.03)  # centers are far outside
+    assert hue(image[30, 30]) == pytest.approx(hue(np.array(rendering.NO_PATCH)), abs=0.03)  # centers are far outside
     corner = reference.vertices[result.patches[0].center]
     row, column_ = (4 if corner[2] > 0 else 55), (55 if corner[0] > 0 else 4)
     wanted = score_colors(result.patch_scores[:1, column])[0]
@@ -127,7 +127,7 @@ def test_score_colors_are_even_and_bad_is_bright() -> None:
     assert (np.diff(lab[:, 0]) < 0).all()
     steps = np.linalg.norm(np.diff(lab, axis=0), axis=1)
     assert steps.max() < 1.35 * steps.min()
-    assert score_colors(np.array([np.nan, 0.5]))[0] == pytest.approx(picture.NO_PATCH)
+    assert score_colors(np.array([np.nan, 0.5]))[0] == pytest.approx(rendering.NO_PATCH)
 
 
 def test_png_decodes(tmp_path: Path) -> None:
@@ -138,8 +138,8 @@ def test_png_decodes(tmp_path: Path) -> None:
     with image.open(path) as decoded:
         assert decoded.format == "PNG" and decoded.mode == "RGB" and decoded.width == 450
         pixels = np.asarray(decoded)
-    assert (pixels[[0, -1]] == picture.BACKGROUND).all()
-    assert (pixels != picture.BACKGROUND).any(axis=2).mean() > 0.3
+    assert (pixels[[0, -1]] == rendering.BACKGROUND).all()
+    assert (pixels != rendering.BACKGROUND).any(axis=2).mean() > 0.3
     assert list(tmp_path.iterdir()) == [path]
 
 
@@ -163,7 +163,7 @@ def test_failure_leaves_the_old_file_alone(tmp_path: Path, monkeypatch: pytest.M
     def fail(*_: object) -> None:
         raise MemoryError
 
-    monkeypatch.setattr(picture, "compose", fail)
+    monkeypatch.setattr(rendering, "compose", fail)
     with pytest.raises(MemoryError):
         write_picture(path, *pair)
     assert list(tmp_path.iterdir()) == [path] and path.read_text() == "an older picture"
@@ -183,5 +183,5 @@ def test_long_names_lose_their_middle() -> None:
     def fits(text: str) -> bool:
         return len(text) <= 12
 
-    assert picture.shorten("short.glb", fits) == "short.glb"
-    assert picture.shorten("a_very_long_name_of_a_file.glb", fits) == "a_ver....glb"
+    assert rendering.shorten("short.glb", fits) == "short.glb"
+    assert rendering.shorten("a_very_long_name_of_a_file.glb", fits) == "a_ver....glb"

@@ -7,8 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from fmqm_addon.blender.display import scene_objects as pointcloud
-from fmqm_addon.blender.display import viewport
+from fmqm_addon.blender.display import scene_objects, viewport
 from fmqm_addon.metric.color import decode_srgb
 
 from . import scenes
@@ -19,7 +18,7 @@ MOVED = np.array([[2.0, 0, 0, 5], [0, 2, 0, 6], [0, 0, 2, 7], [0, 0, 0, 1]])
 
 
 def cloud(size: float = 0.1) -> bpy.types.Object:
-    return pointcloud.build_cloud(bpy.context.scene, pointcloud.CLOUD, "FMQM Cloud", POSITIONS, UP, MOVED, size)
+    return scene_objects.build_cloud(bpy.context.scene, scene_objects.CLOUD, "FMQM Cloud", POSITIONS, UP, MOVED, size)
 
 
 def vertices(object_: bpy.types.Object) -> np.ndarray:
@@ -30,7 +29,7 @@ def vertices(object_: bpy.types.Object) -> np.ndarray:
 
 def colors(object_: bpy.types.Object) -> np.ndarray:
     values = np.empty(4 * len(object_.data.vertices), np.float32)
-    object_.data.attributes[pointcloud.COLOR].data.foreach_get("color", values)
+    object_.data.attributes[scene_objects.COLOR].data.foreach_get("color", values)
     return values.reshape(-1, 4)
 
 
@@ -54,21 +53,21 @@ def test_points_are_closed_and_face_outwards() -> None:
 def test_colors_are_linear_and_one_a_point() -> None:
     made = cloud()
     wanted = np.array([[1.0, 0.5, 0], [0, 0, 0], [0.2, 0.4, 0.8]])
-    pointcloud.recolor(made, wanted)
+    scene_objects.recolor(made, wanted)
     assert colors(made)[:, :3] == pytest.approx(np.repeat(decode_srgb(wanted), 4, axis=0), abs=1e-6)
     assert colors(made)[0, 1] == pytest.approx(0.2140, abs=1e-4)
     assert (colors(made)[:, 3] == 1).all()
     with pytest.raises(ValueError, match="5 colors do not fit the 12 vertices"):
-        pointcloud.recolor(made, np.zeros((5, 3)))
+        scene_objects.recolor(made, np.zeros((5, 3)))
 
 
 def test_points_grow_and_vanish_in_place() -> None:
     made = cloud()
-    pointcloud.resize(made, 0.3, np.array([True, False, True]))
+    scene_objects.resize(made, 0.3, np.array([True, False, True]))
     corners = vertices(made).reshape(-1, 4, 3)
     assert np.linalg.norm(corners - POSITIONS[:, None], axis=2)[0] == pytest.approx(0.3)
     assert (corners[1] == corners[1, 0]).all()
-    pointcloud.resize(made, 0.2)  # which are shown stays as it was
+    scene_objects.resize(made, 0.2)  # which are shown stays as it was
     corners = vertices(made).reshape(-1, 4, 3)
     assert np.linalg.norm(corners - POSITIONS[:, None], axis=2)[:, 0] == pytest.approx([0.2, 0, 0.2], abs=1e-6)
     assert corners.mean(axis=1) == pytest.approx(POSITIONS, abs=1e-6)
@@ -81,9 +80,9 @@ def test_a_second_one_replaces_the_first() -> None:
     first.name = "My Own Name"  # tags, not names, say what is ours
     cloud()
     assert len(scenes.blocks()) == len(before)
-    pointcloud.build_slice(bpy.context.scene, "FMQM Slice", np.eye(4), 8)
+    scene_objects.build_slice(bpy.context.scene, "FMQM Slice", np.eye(4), 8)
     before = scenes.blocks()
-    pointcloud.build_slice(bpy.context.scene, "FMQM Slice", np.eye(4), 16)
+    scene_objects.build_slice(bpy.context.scene, "FMQM Slice", np.eye(4), 16)
     assert len(scenes.blocks()) == len(before)
 
 
@@ -91,22 +90,22 @@ def test_clear_takes_only_what_is_ours() -> None:
     mine = scenes.cube("FMQM Cloud", materials=[scenes.material("FMQM Color")])
     bpy.data.collections.new("FMQM").use_fake_user = True
     before = scenes.blocks()
-    assert not pointcloud.anything()
+    assert not scene_objects.anything()
     made = cloud()
-    assert made != mine and pointcloud.anything()
+    assert made != mine and scene_objects.anything()
     bpy.context.scene.collection.objects.link(made.copy())  # Shift D
     triangles = np.array([[0, 1, 2]])
-    pointcloud.build_surface(bpy.context.scene, pointcloud.PAINTED, "FMQM Painted", POSITIONS, triangles, MOVED)
-    pointcloud.build_slice(bpy.context.scene, "FMQM Slice", MOVED, 8)
-    assert pointcloud.clear() > 0
+    scene_objects.build_surface(bpy.context.scene, scene_objects.PAINTED, "FMQM Painted", POSITIONS, triangles, MOVED)
+    scene_objects.build_slice(bpy.context.scene, "FMQM Slice", MOVED, 8)
+    assert scene_objects.clear() > 0
     assert scenes.blocks() == before
-    assert not pointcloud.anything()
+    assert not scene_objects.anything()
 
 
 def test_slice_holds_the_colors_as_they_are_encoded() -> None:
-    plane = pointcloud.build_slice(bpy.context.scene, "FMQM Slice", MOVED, 2)
+    plane = scene_objects.build_slice(bpy.context.scene, "FMQM Slice", MOVED, 2)
     wanted = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1], [0.2, 0.4, 0.6]])
-    pointcloud.draw_slice(plane, wanted)
+    scene_objects.draw_slice(plane, wanted)
     pixels = np.empty(16, np.float32)
     plane.data.pixels.foreach_get(pixels)
     assert pixels.reshape(4, 4)[:, :3] == pytest.approx(wanted, abs=0.5 / 255)

@@ -10,8 +10,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from fmqm_addon.blender.files.load.load import load_placed
 
+from fmqm_addon.blender.files.load import load_placed
 from fmqm_addon.blender.materials.images import black_warnings, load_texture
 from fmqm_addon.blender.scene.mesh_arrays import AS_FOUND
 from fmqm_addon.metric.errors import MeshError

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import bpy
 import pytest
-from fmqm_addon.blender.files.load.load import load_mesh
 
+from fmqm_addon.blender.files.load import load_mesh
 from fmqm_addon.blender.scene.bvh import BVHQuery
 from fmqm_addon.comparison.measurement import Measurement
 from fmqm_addon.metric.settings import Settings

@@ -12,10 +12,10 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
-from fmqm_addon.blender.files.load.load import load_mesh
 
 import fmqm_addon
 from fmqm_addon import api
+from fmqm_addon.blender.files.load import load_mesh
 from fmqm_addon.comparison.measurement import Measurement
 from fmqm_addon.comparison.trust import Fact
 from fmqm_addon.metric.score import COLUMNS

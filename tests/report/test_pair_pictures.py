@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fmqm_addon.batch import scorer as run
+from fmqm_addon.batch import scorer
 from fmqm_addon.batch.journal import Journal
 from fmqm_addon.batch.progress_log import Log
 from fmqm_addon.batch.rows import Options, Row, Task
@@ -31,17 +31,17 @@ def test_only_output_errors_stop_the_run(monkeypatch: pytest.MonkeyPatch, error:
     def fail(*_: Any) -> None:
         raise error
 
-    scorer = run._Scorer(Options(Settings()), journal := Journal(), Log("", 2, 1, silent=True), None)
+    working = scorer._Scorer(Options(Settings()), journal := Journal(), Log("", 2, 1, silent=True), None)
     for name in ("_load", "_tell_memory", "_work"):
-        monkeypatch.setattr(scorer, name, lambda *_: type("Placed", (), {"world": lambda self: None})())
+        monkeypatch.setattr(working, name, lambda *_: type("Placed", (), {"world": lambda self: None})())
     monkeypatch.setattr(
         "fmqm_addon.comparison.measurement.Measurement", lambda *_: type("M", (), {"prepare": lambda self: None})()
     )
-    monkeypatch.setattr(scorer, "_compare", fail)
+    monkeypatch.setattr(working, "_compare", fail)
     task = Task("key", Row("1", "r", "d"))
     if stops:
         with pytest.raises(OutputError):
-            scorer.score([task])
+            working.score([task])
     else:
-        scorer.score([task])
+        working.score([task])
     assert ("key" in journal) is not stops
