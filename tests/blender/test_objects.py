@@ -18,7 +18,7 @@ from mathutils import Euler, Matrix, Vector
 from fmqm_addon.blender.baking import bake
 from fmqm_addon.blender.files.load import load_mesh, load_placed
 from fmqm_addon.blender.materials.types import Reading
-from fmqm_addon.blender.scene import mesh_arrays
+from fmqm_addon.blender.scene import mesh_arrays as mesh_module
 from fmqm_addon.blender.scene.evaluated import evaluated
 from fmqm_addon.blender.scene.measure import measuring
 from fmqm_addon.blender.scene.members import check_object, metaball_mother, scene_members
@@ -649,7 +649,7 @@ def test_what_cannot_be_read_is_baked_once_for_all_instances(hidden: bool, monke
         baked.append(object_.name)
         return bake.bake_slots(object_, *rest)
 
-    monkeypatch.setattr(mesh_arrays, "bake_slots", bake_slots)
+    monkeypatch.setattr(mesh_module, "bake_slots", bake_slots)
     before = scenes.blocks()
     arrays = take(target_of(ground), Reading(bake=64)).mesh
     assert scenes.blocks() == before
@@ -688,7 +688,7 @@ def test_meshes_that_only_instances_have_are_baked_once(monkeypatch: pytest.Monk
         sizes.append(np.ptp([vertex.co for vertex in object_.data.vertices]))
         return bake.bake_slots(object_, *rest)
 
-    monkeypatch.setattr(mesh_arrays, "bake_slots", bake_slots)
+    monkeypatch.setattr(mesh_module, "bake_slots", bake_slots)
     before = scenes.blocks()
     arrays = mesh_arrays([ground], "asset", Reading(bake=64))
     assert scenes.blocks() == before
