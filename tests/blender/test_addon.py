@@ -322,7 +322,7 @@ def test_the_place_of_the_compared(fmqm: ui.scene.FMQMScene, lods: list[bpy.type
 
 
 @pytest.mark.parametrize(
-    ("change", "stale"),
+    ("change", "names"),
     [
         (lambda lods: None, {}),
         (lambda lods: setattr(lods[1].modifiers[0], "ratio", 0.3), {"Rock_LOD1"}),
@@ -337,14 +337,14 @@ def test_the_place_of_the_compared(fmqm: ui.scene.FMQMScene, lods: list[bpy.type
     ],
 )
 def test_rows_that_are_out_of_date(
-    fmqm: ui.scene.FMQMScene, lods: list[bpy.types.Object], change: object, stale: set[str]
+    fmqm: ui.scene.FMQMScene, lods: list[bpy.types.Object], change: object, names: set[str]
 ) -> None:
     compare(lods[0], *lods[1:])
     bpy.ops.fmqm.measure()
     change(lods)  # type: ignore[operator]
     bpy.context.view_layer.update()
     stale.check(bpy.context.scene)
-    assert {row.name for row in fmqm.rows if row.uid in session.stale} == (stale or set())
+    assert {row.name for row in fmqm.rows if row.uid in session.stale} == (names or set())
 
 
 def stale_names(fmqm: ui.scene.FMQMScene) -> set[str]:
