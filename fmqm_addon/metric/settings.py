@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields, replace
-from numbers import Integral
+from numbers import Integral, Real
 from typing import Any
 
 from .errors import SettingsError
@@ -28,10 +29,10 @@ class Settings:
         patches: number of local surface patches, N_patch.
         scored_patches: only the first so many patches are scored, at full density; None scores all.
         sigma: standard deviation of the normal offset, in patch diagonals, sigma_base (V-C).
-        radius: radius r of the color units, in patch diagonals (IV-D).
+        radius: radius r of the color units, in patch diagonals (IV-C).
         gradient_radius: the same for the color gradient (V-E4); inf is the whole patch.
-        normal_threshold: norThre, |cos| above it is "along the normal" (IV-D).
-        tangent_threshold: tanThre, |cos| below it is "in the tangent plane" (IV-D).
+        normal_threshold: norThre, |cos| above it is "along the normal" (IV-C).
+        tangent_threshold: tanThre, |cos| below it is "in the tangent plane" (IV-C).
         color_units: color units drawn per patch, N_color_patch (V-E3).
         centers: "fps" or "random" choice of patch centres (V-B).
         color_space: "rgb" or "lab" (supplement, "Ablations").
@@ -57,22 +58,26 @@ class Settings:
     seed: int = 0
 
     def __post_init__(self) -> None:
+        """Numbers and texts of numpy's become Python's own, which JSON takes; True and False are no numbers."""
         for name in ("samples", "patches", "color_units", "seed", "scored_patches"):
             value = getattr(self, name)
-            whole = isinstance(value, Integral) or (value is None and name == "scored_patches")
-            _require(whole, name, value, "a whole number")
+            if value is not None or name != "scored_patches":
+                whole = isinstance(value, Integral) and not isinstance(value, bool)
+                _require(whole, name, value, "a whole number")
+                object.__setattr__(self, name, int(value))
+        for name, (fits, wanted) in _RANGES.items():
+            value = getattr(self, name)
+            _require(fits(_double(value)), name, value, wanted)
+            object.__setattr__(self, name, _double(value))
+        for name, choices in (("centers", CENTERS), ("color_space", COLOR_SPACES), ("pooling", POOLINGS)):
+            value = getattr(self, name)
+            _require(isinstance(value, str) and value in choices, name, value, " or ".join(choices))
+            object.__setattr__(self, name, str(value))
         for name in ("samples", "patches", "color_units"):
             _require(getattr(self, name) >= 1, name, getattr(self, name), "at least 1")
         _require(self.samples <= MAX_SAMPLES, "samples", self.samples, f"at most {MAX_SAMPLES}")
         if self.scored_patches is not None:
             _require(self.scored_patches >= 1, "scored_patches", self.scored_patches, "at least 1")
-        _require(0 <= self.sigma < math.inf, "sigma", self.sigma, "a finite number, at least 0")
-        _require(0 < self.radius, "radius", self.radius, "above 0 (inf: the whole patch)")
-        _require(0 < self.gradient_radius, "gradient_radius", self.gradient_radius, "above 0 (inf: the whole patch)")
-        for name in ("normal_threshold", "tangent_threshold"):
-            _require(0 <= getattr(self, name) <= 1, name, getattr(self, name), "between 0 and 1")
-        for name, choices in (("centers", CENTERS), ("color_space", COLOR_SPACES), ("pooling", POOLINGS)):
-            _require(getattr(self, name) in choices, name, getattr(self, name), " or ".join(choices))
         _require(0 <= self.seed < 2**63, "seed", self.seed, "a whole number from 0 to 2^63 - 1")
         _require(
             self.samples >= MIN_SAMPLES_PER_PATCH * self.patches,
@@ -92,6 +97,24 @@ class Settings:
 
 SETTING_NAMES = tuple(field.name for field in fields(Settings))
 PRESETS: dict[str, dict[str, Any]] = {"paper": {}, "fast": {"scored_patches": FAST_SCORED_PATCHES}}
+
+_RANGES: dict[str, tuple[Callable[[float], bool], str]] = {
+    "sigma": (lambda x: 0 <= x < math.inf, "a finite number, at least 0"),
+    "radius": (lambda x: x > 0, "above 0 (inf: the whole patch)"),
+    "gradient_radius": (lambda x: x > 0, "above 0 (inf: the whole patch)"),
+    "normal_threshold": (lambda x: 0 <= x <= 1, "between 0 and 1"),
+    "tangent_threshold": (lambda x: 0 <= x <= 1, "between 0 and 1"),
+}
+
+
+def _double(value: Any) -> float:
+    """The value in double precision; nan, which no range holds, where it is no number or beyond that precision."""
+    if isinstance(value, bool) or not isinstance(value, Real):
+        return math.nan
+    try:
+        return float(value)
+    except OverflowError:
+        return math.nan
 
 
 def _require(ok: bool, name: str, value: object, wanted: str) -> None:

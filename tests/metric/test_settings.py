@@ -5,8 +5,10 @@ from __future__ import annotations
 
 import json
 import math
+from fractions import Fraction
 from typing import Any
 
+import numpy as np
 import pytest
 
 from fmqm_addon.metric.errors import FMQMError, SettingsError
@@ -76,6 +78,26 @@ def test_counts_and_the_seed_are_whole_numbers(name: str, value: float) -> None:
         Settings(**{name: value})  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("name", [name for name in SETTING_NAMES if name not in {"centers", "color_space", "pooling"}])
+@pytest.mark.parametrize("value", [True, False, np.True_, "1", [1], np.ones(1), 1j], ids=repr)
+def test_what_is_no_number_is_refused(name: str, value: object) -> None:
+    with pytest.raises(SettingsError, match=f"^{name.replace('_', '-')} is .*; it must be ."):
+        Settings(**{name: value})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["centers", "color_space", "pooling"])
+@pytest.mark.parametrize("value", [1, ["fps"], np.array(["rgb", "lab"])], ids=repr)
+def test_what_is_no_text_is_refused(name: str, value: object) -> None:
+    with pytest.raises(SettingsError, match=f"^{name.replace('_', '-')} is .*; it must be .* or "):
+        Settings(**{name: value})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["sigma", "radius", "gradient_radius", "normal_threshold", "tangent_threshold"])
+def test_a_number_beyond_double_precision_is_refused(name: str) -> None:
+    with pytest.raises(SettingsError, match=f"^{name.replace('_', '-')} is "):
+        Settings(**{name: 10**400})
+
+
 def test_every_setting_has_a_bad_value_here() -> None:
     assert {name for name, _ in BAD} == set(SETTING_NAMES)
 
@@ -112,6 +134,22 @@ def test_settings_survive_json() -> None:
     settings = Settings(gradient_radius=math.inf, seed=7)
     assert json.loads(json.dumps(settings.as_dict(), allow_nan=False))["gradient_radius"] == "inf"
     assert settings.with_seed(8) == Settings(gradient_radius=math.inf, seed=8)
+
+
+def test_numbers_of_numpy_are_taken_and_saved_as_pythons() -> None:
+    """Every type of numpy's: what is kept is a plain int, float or text, so that JSON takes it."""
+    whole = [np.int64(40), np.int32(40), np.uint16(40), np.uint64(40)]
+    real = [np.float64(0.25), np.float32(0.25), np.float16(0.25), np.int8(1), 1, Fraction(1, 4)]
+    given: list[dict[str, Any]] = [{"patches": n, "scored_patches": n, "color_units": n, "seed": n} for n in whole]
+    given += [{name: x for name in SETTING_NAMES if type(getattr(Settings(), name)) is float} for x in real]
+    given += [{"samples": np.int64(9000)}, {"centers": np.str_("random"), "color_space": np.str_("lab")}]
+    for values in given:
+        settings = Settings(**values)
+        for name, value in values.items():
+            kept = getattr(settings, name)
+            assert kept == value and type(kept) in (int, float, str), (name, value)
+            assert name not in {"sigma", "radius"} or type(kept) is float
+        assert Settings(**json.loads(json.dumps(settings.as_dict()))) == settings
 
 
 def test_presets_are_settings() -> None:
