@@ -316,7 +316,7 @@ class Texture:
     solid: bool = False
 
     def lookup(self, values: Floats) -> Floats:
-        """Equation (7): (N, 3) float64 colors in [0, 1] for (N, K) corner values.
+        """Equations (6) and (7): (N, 3) float64 colors in [0, 1] for (N, K) corner values.
 
         Pixel i = u W - 0.5, j = (1 - v) H - 0.5, bilinear in float64.
         """

@@ -76,7 +76,7 @@ def features_of_patches(
 
 
 def similarity(mean_r: Any, mean_d: Any, var_r: Any, var_d: Any, cov: Any, epsilon: float) -> Any:
-    """Equations (18) to (21), and (24) to (27): cube root of mean, deviation and covariance similarity."""
+    """Equations (15) to (18), and (22) to (25): cube root of mean, deviation and covariance similarity."""
     std_product = np.sqrt(var_r * var_d)
     mean = np.abs(2 * mean_r * mean_d + epsilon) / (mean_r * mean_r + mean_d * mean_d + epsilon)
     std = (2 * std_product + epsilon) / (var_r + var_d + epsilon)
@@ -85,14 +85,14 @@ def similarity(mean_r: Any, mean_d: Any, var_r: Any, var_d: Any, cov: Any, epsil
 
 
 def geometry_similarity(sdf_r: Floats, sdf_d: Floats) -> float:
-    """Equation (21) over the samples of a patch, from population moments."""
+    """Equations (15) to (18) over the samples of a patch, from population moments."""
     mean_r, mean_d = sdf_r.mean(), sdf_d.mean()
     r, d = sdf_r - mean_r, sdf_d - mean_d
     return float(similarity(mean_r, mean_d, np.mean(r * r), np.mean(d * d), np.mean(r * d), EPSILON_SDF))
 
 
 def geometry_gradient_similarity(to_ref: Floats, to_dist: Floats) -> float:
-    """Equation (23): root mean squared cosine of the SDF gradients; their signs square away.
+    """Equations (20) and (21): root mean squared cosine of the SDF gradients; their signs square away.
 
     Args:
         to_ref, to_dist: (n, 3) p_n - p. A sample on either surface counts 1.
@@ -165,7 +165,7 @@ def unit_cosine(pairs: Pairs, units: Ints, towards: Floats) -> Floats:
 
 
 def similarity_of_units(pairs: Pairs, units: Ints, ref: FieldValues, dist: FieldValues) -> NDArray[np.float64]:
-    """(C, units) equations (24) to (27) over each unit: p itself and the p' of its pairs.
+    """(C, units) equations (22) to (25) over each unit: p itself and the p' of its pairs.
 
     Colors are taken relative to p's, so that the moments of a nearly plain unit do not cancel.
     """
@@ -197,7 +197,7 @@ class Gradient:
 
 
 def color_gradient(pairs: Pairs, units: Ints, channels: Floats) -> Gradient:
-    """Equations (30) and (31): the largest color difference by distance among each unit's pairs.
+    """Equations (28) and (29): the largest color difference by distance among each unit's pairs.
 
     The direction's sign is left out: it is squared away. No pair, or no difference: 0.
     """
@@ -221,7 +221,7 @@ def color_gradient(pairs: Pairs, units: Ints, channels: Floats) -> Gradient:
 
 
 def gradient_similarity(ref: Gradient, dist: Gradient, weights: Floats) -> float:
-    """Equations (32) to (34): direction and magnitude of the color gradients, the means over the units."""
+    """Equations (30) to (32): direction and magnitude of the color gradients, the means over the units."""
     flat_r, flat_d = ref.magnitude == 0, dist.magnitude == 0
     direction = np.stack([_squared_cosine(r, d, 0.0) for r, d in zip(ref.step, dist.step, strict=True)])
     direction[flat_r & flat_d] = 1.0
@@ -233,7 +233,7 @@ def gradient_similarity(ref: Gradient, dist: Gradient, weights: Floats) -> float
 
 
 def pool_features(features: Floats, pooling: str) -> NDArray[np.float64]:
-    """(P,) FMQM of the patches from their (P, 4) features (V-E5; arithmetic: supplement)."""
+    """(P,) FMQM of the patches from their (P, 4) features: equation (33) (arithmetic: supplement)."""
     return features.mean(axis=1) if pooling == "arithmetic" else features.prod(axis=1) ** 0.25
 
 

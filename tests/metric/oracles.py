@@ -271,7 +271,7 @@ def s_of(a: Row, b: Row, e: float) -> float:
 
 
 def steepest(positions: Floats, channel: Floats, unit: int, members: list[int]) -> tuple[float, Floats]:
-    """Equations (30), (31): gradient magnitude and signed unit direction; zeros for no gradient."""
+    """Equations (28) and (29): gradient magnitude and signed unit direction; zeros for no gradient."""
     best, direction = 0.0, np.zeros(3)
     for other in members:
         difference = float(channel[other] - channel[unit])
@@ -289,7 +289,7 @@ def weighted_mean(values: Row, weights: Row) -> float:
 def color_gradient_similarity(
     ref: list[list[tuple[float, Floats]]], dist: list[list[tuple[float, Floats]]], weights: Row
 ) -> float:
-    """Equations (32) to (34) from [channel][unit] gradients."""
+    """Equations (30) to (32) from [channel][unit] gradients."""
     angular, magnitude = [], []
     for channel_r, channel_d in zip(ref, dist, strict=True):
         cosines, unlike = [], []
@@ -302,7 +302,7 @@ def color_gradient_similarity(
 
 
 def gradient_cosines(positions: Floats, nearest_r: Floats, nearest_d: Floats) -> float:
-    """Equation (23): root mean square of g_r . g_d; a sample on either surface counts 1."""
+    """Equation (21): root mean square of g_r . g_d; a sample on either surface counts 1."""
     total = []
     for p, r, d in zip(positions, nearest_r, nearest_d, strict=True):
         to_r, to_d = p - r, p - d

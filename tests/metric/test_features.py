@@ -258,7 +258,7 @@ def test_geometry_gradients_by_hand(ref: list[list[float]], dist: list[list[floa
 
 @given(cases, st.sampled_from([0.1, 0.3, math.inf]))
 def test_color_gradients(case: Case, radius: float) -> None:
-    """Equations (30) and (31): the steepest difference of each unit and channel, and where it leads."""
+    """Equations (28) and (29): the steepest difference of each unit and channel, and where it leads."""
     pairs = find_pairs(case.positions, case.units, radius)
     gradient = color_gradient(pairs, case.units, case.ref.channels)
     assert gradient.magnitude.shape == (3, len(case.units))
