@@ -4,7 +4,7 @@
 from bl_ext.user_default.fmqm.fmqm_addon import api   # installed; or: from fmqm_addon import api
 
 for outcome in api.measure(bpy.data.objects["Rock_LOD0"], [bpy.data.objects["Rock_LOD1"]]):
-    print(outcome.target.name, outcome.error or outcome.scores[api.COLUMNS.index("FMQM")])
+    print(outcome.target.name, outcome.error or outcome.scores.FMQM)
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from .blender.materials.types import Reading
 from .blender.scene.measure import Outcome, measuring
 from .blender.scene.target import target_of
 from .comparison.pair import Question
-from .metric.score import COLUMNS, Result
+from .metric.score import COLUMNS, Result, Scores
 from .metric.settings import PRESETS, Settings
 
-__all__ = ["COLUMNS", "PRESETS", "Outcome", "Result", "Settings", "measure"]
+__all__ = ["COLUMNS", "PRESETS", "Outcome", "Result", "Scores", "Settings", "measure"]
 
 Asset: TypeAlias = bpy.types.Object | bpy.types.Collection
 _ASSETS = (bpy.types.Object, bpy.types.Collection)
@@ -49,13 +49,13 @@ def measure(
         repeats: measure with so many seeds; scores become means.
         reference_without_modifiers: the reference is its mesh without modifiers, so that an object can be
             measured against itself.
-        both: score the other direction too: `outcome.reverse`, (5,) float64 like the scores.
+        both: score the other direction too: `outcome.reverse`, Scores as well.
         attribution: score geometry and texture apart too: `outcome.attribution`, whose loss it is.
         bake: side in pixels of the images onto which materials are baked that cannot be read; 0 forbids it.
 
     Returns:
-        One outcome per distorted asset, in their order; `outcome.scores` is (5,) float64 in the order of
-        COLUMNS, or None with the reason in `outcome.error`. `outcome.comparison.result` is a metric.score.Result
+        One outcome per distorted asset, in their order; `outcome.scores` are Scores, a named tuple in the order
+        of COLUMNS, or None with the reason in `outcome.error`. `outcome.comparison.result` is a metric.score.Result
         with patches, samples and fields, `outcome.trust` a comparison.trust.Trust: how far to believe the scores.
 
     Raises:

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..metric.color import Material
 from ..metric.fields import closest_on
-from ..metric.score import COLUMNS, Progress, Stepper, Work, as_part
+from ..metric.score import Progress, Stepper, Work, as_part
 from ..metric.spatial import Floats, Ints
 from ..metric.surface import MeshArrays, Surface
 from .measurement import Comparison, Measurement
@@ -29,8 +29,6 @@ AGREES = 0.02  # of the texture's side: what noise and decimation shift texture 
 MOST = 0.8  # of the samples or triangles; seams and far-moved parts are the rest
 LITTLE = 0.02  # loss of FMQM that is not worth asking whose it is
 CLEARLY = 2.0  # one loss is this many times the other: it is most of it
-
-_FMQM = COLUMNS.index("FMQM")
 
 
 @dataclass(frozen=True)
@@ -102,7 +100,7 @@ def _attribute(
     losses: list[float] = []
     for mesh in painted:
         painting = yield from as_part(measurement.compare(mesh), 0.5 * len(losses), 0.5)
-        losses.append(max(0.0, 1.0 - float(painting.scores[_FMQM])))
+        losses.append(max(0.0, 1.0 - painting.scores.FMQM))
     return Attribution(losses[0], losses[1], how)
 
 

@@ -10,9 +10,8 @@ import numpy as np
 
 from ..blender.scene.bvh import BVHQuery
 from ..metric.errors import MeshError
-from ..metric.score import COLUMNS, Evaluation, Progress, Result, Stepper, Work, as_part, as_work
+from ..metric.score import Evaluation, Progress, Result, Scores, Stepper, Work, as_part, as_work
 from ..metric.settings import Settings
-from ..metric.spatial import Floats
 from ..metric.surface import MeshArrays, Surface, preparing_surface
 from .trust import Fact, Trust, assessing, surface_facts
 
@@ -22,14 +21,14 @@ class Comparison:
     """Scores of one distorted mesh.
 
     Attributes:
-        scores: (5,) float64 in the order of metric.score.COLUMNS, mean over the seeds.
-        stderr: (5,) standard error of that mean; None for one seed.
+        scores: means over the seeds.
+        stderr: standard errors of these means; None for one seed.
         result: of the first seed, with patches and fields. distorted: the prepared surface.
         trust: what is known about the scores, from the first seed.
     """
 
-    scores: Floats
-    stderr: Floats | None
+    scores: Scores
+    stderr: Scores | None
     result: Result
     distorted: Surface
     trust: Trust
@@ -66,8 +65,8 @@ class Measurement:
         """
         return Stepper(self._compare(distorted, known))
 
-    def reverse(self, distorted: MeshArrays) -> Stepper[Floats]:
-        """The other direction, the distorted mesh as the reference: (5,) float64 mean scores over the seeds.
+    def reverse(self, distorted: MeshArrays) -> Stepper[Scores]:
+        """The other direction, the distorted mesh as the reference: mean scores over the seeds.
 
         Sees what only the distorted mesh has, and costs a preparation of its own.
         """
@@ -88,19 +87,18 @@ class Measurement:
             self._facts = yield from as_work(surface_facts(self.reference), "features", 0.92, 0.96)
         assessed = assessing(self.reference, surface, results[0], self._facts)
         trust = yield from as_work(assessed, "features", 0.96, 1.0)
-        scores = np.array([result.scores for result in results])
         stderr = None
         if len(results) > 1:
-            stderr = scores.std(axis=0, ddof=1) / np.sqrt(len(results))
+            spread = np.std([result.scores for result in results], axis=0, ddof=1)
+            stderr = Scores(*(spread / np.sqrt(len(results))).tolist())
         pair = (*known, *trust.pair, _error_fact(stderr, len(results)))
-        return Comparison(scores.mean(axis=0), stderr, results[0], surface, replace(trust, pair=pair))
+        return Comparison(_mean_scores(results), stderr, results[0], surface, replace(trust, pair=pair))
 
-    def _reverse(self, distorted: MeshArrays) -> Work[Floats]:
+    def _reverse(self, distorted: MeshArrays) -> Work[Scores]:
         other = Measurement(distorted, self._settings, self._repeats)
         yield from as_part(other.prepare(), 0.0, 0.5)
         _, results = yield from other._results(self._mesh, 0.5, 0.5)
-        scores: Floats = np.mean([result.scores for result in results], axis=0)
-        return scores
+        return _mean_scores(results)
 
     def _results(self, distorted: MeshArrays, first: float, share: float) -> Work[tuple[Surface, list[Result]]]:
         """The prepared mesh and its result for each seed; progress goes from first on by the share."""
@@ -123,7 +121,11 @@ class Measurement:
         return surface, results
 
 
-def _error_fact(stderr: Floats | None, repeats: int) -> Fact:
+def _mean_scores(results: Sequence[Result]) -> Scores:
+    return Scores(*np.mean([result.scores for result in results], axis=0).tolist())
+
+
+def _error_fact(stderr: Scores | None, repeats: int) -> Fact:
     if stderr is None:
         return Fact("standard_error", None, "of FMQM", "measured with one seed; repeats tell it")
-    return Fact("standard_error", float(stderr[COLUMNS.index("FMQM")]), f"of FMQM, over {repeats} seeds")
+    return Fact("standard_error", stderr.FMQM, f"of FMQM, over {repeats} seeds")

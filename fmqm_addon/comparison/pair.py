@@ -9,9 +9,8 @@ from dataclasses import dataclass
 from ..blender.materials.types import MAX_BAKE, Reading
 from ..blender.trust import known_facts
 from ..metric.errors import SettingsError
-from ..metric.score import Stepper, Work, as_part
+from ..metric.score import Scores, Stepper, Work, as_part
 from ..metric.settings import Settings
-from ..metric.spatial import Floats
 from ..metric.surface import Surface
 from .alignment import SPACES, Placed, Placement, place
 from .attribution import Attribution, attribute
@@ -57,14 +56,14 @@ class Answer:
 
     Attributes:
         reference: the prepared surface; comparison holds the other one.
-        reverse: (5,) float64 scores of the other direction; None: not asked for.
+        reverse: scores of the other direction; None: not asked for.
         attribution: whose loss it is; None: not asked for.
     """
 
     reference: Surface
     placement: Placement
     comparison: Comparison
-    reverse: Floats | None
+    reverse: Scores | None
     attribution: Attribution | None
 
     @property

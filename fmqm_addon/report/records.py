@@ -13,18 +13,14 @@ from dataclasses import dataclass, field
 from itertools import chain
 from typing import Any
 
-import numpy as np
-
 from ..metric.errors import one_line
-from ..metric.score import COLUMNS
-from ..metric.spatial import Floats
+from ..metric.score import COLUMNS, Scores
 from .trust_table import Report, trust_text
 
 SHOWN = ("FMQM", *(name for name in COLUMNS if name != "FMQM"))  # the score first, then its features
 STAGES = ("load", "prepare", "fields", "features", "total")
 REVERSE = "reverse "  # before the names of the other direction's columns
 _LONE = re.compile("[\ud800-\udfff]")
-_INDEX = {name: COLUMNS.index(name) for name in SHOWN}
 
 
 @dataclass(frozen=True)
@@ -33,26 +29,26 @@ class PairScore:
 
     Attributes:
         reference, distorted: as the user named them.
-        scores, stderr: (5,) in the order of metric.score.COLUMNS; None where there are none.
+        scores, stderr: None where there are none.
         seconds: by STAGES; what several pairs share is counted in the first.
         error: why there are no scores.
         space: where the two were compared, as comparison.alignment.Placement.label has it.
-        reverse: (5,) scores of the other direction, the distorted mesh as the reference; None: not asked for.
+        reverse: scores of the other direction, the distorted mesh as the reference; None: not asked for.
         trust: as report.trust_table.trust_dict has it.
         findings: what else was asked for, by its key in the record: where, attribution, pictures.
     """
 
     reference: str
     distorted: str
-    scores: Floats | None = None
-    stderr: Floats | None = None
+    scores: Scores | None = None
+    stderr: Scores | None = None
     patches: int | None = None
     samples: int | None = None
     seconds: dict[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     error: str | None = None
     space: str | None = None
-    reverse: Floats | None = None
+    reverse: Scores | None = None
     trust: Report | None = None
     findings: dict[str, Any] = field(default_factory=dict)
 
@@ -166,11 +162,10 @@ def _csv_line(values: Iterable[str]) -> str:
     return out.getvalue().removesuffix("\r\n") + "\n"
 
 
-def _columns(values: Floats | None) -> dict[str, float | None]:
+def _columns(values: Scores | None) -> dict[str, float | None]:
     if values is None:
         return dict.fromkeys(SHOWN)
-    numbers = np.asarray(values, np.float64).tolist()
-    return {name: numbers[_INDEX[name]] for name in SHOWN}
+    return {name: getattr(values, name) for name in SHOWN}
 
 
 RECORD_KEYS = frozenset(pair_record(PairScore("", "")))  # what each record has

@@ -300,8 +300,8 @@ def compose(reference: Surface, distorted: Surface, result: Result, width: int =
     for index, view in enumerate(three_views(reference, distorted, faces, camera, sheet.panel)):
         canvas.paste(Image.fromarray(view), (sheet.left(index), sheet.top))
     draw = ImageDraw.Draw(canvas)
-    score = float(result.scores[COLUMNS.index("FMQM")])
-    features = [f"{name} {value:.3f}" for name, value in zip(COLUMNS[:4], result.scores, strict=False)]
+    score = result.scores.FMQM
+    features = [f"{name} {value:.3f}" for name, value in zip(COLUMNS[:4], result.scores[:4], strict=True)]
     sheet.label(draw, 0, "Reference", reference.name, f"{len(reference.triangles):,} triangles")
     sheet.label(draw, 1, "Distorted", distorted.name, f"{len(distorted.triangles):,} triangles")
     sheet.label(draw, 2, f"FMQM {score:.4f}", "   ".join(features[:2]), "   ".join(features[2:]))

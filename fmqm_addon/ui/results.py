@@ -8,14 +8,12 @@ import os
 from typing import Any, ClassVar
 
 import bpy
-import numpy as np
 from bpy.props import EnumProperty, StringProperty
 
 from .. import VERSION
 from ..metric.errors import FMQMError
-from ..metric.score import COLUMNS
+from ..metric.score import Scores
 from ..metric.settings import PRESETS, SETTING_NAMES, Settings
-from ..metric.spatial import Floats
 from ..report.atomic_files import write_text
 from ..report.npz import save_fields
 from ..report.records import SHOWN, PairScore, csv_text, json_text, table_text
@@ -72,22 +70,22 @@ def pair_of(row: FMQMRow) -> PairScore:
     return PairScore(
         reference=reference.label,
         distorted=target.label,
-        scores=_array(row_scores(row)),
-        stderr=_array(row_stderr(row)),
+        scores=_scores(row_scores(row)),
+        stderr=_scores(row_stderr(row)),
         patches=row.patches or None,
         samples=row.samples or None,
         seconds=json.loads(row.stages or "{}"),
         warnings=tuple(row.warnings.splitlines()),
         error=row.error or None,
         space=row.space or None,
-        reverse=_array(row_reverse(row)),
+        reverse=_scores(row_reverse(row)),
         trust=row_trust(row),
         findings={} if attribution is None else {"attribution": attribution},
     )
 
 
-def _array(columns: dict[str, float] | None) -> Floats | None:
-    return None if columns is None else np.array([columns[name] for name in COLUMNS])
+def _scores(columns: dict[str, float] | None) -> Scores | None:
+    return None if columns is None else Scores(**columns)
 
 
 def _has_rows(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:

@@ -136,7 +136,7 @@ def test_the_same_doubles_as_the_script(fmqm: ui.scene.FMQMScene, lods: list[bpy
     assert bpy.ops.fmqm.measure() == {"FINISHED"}
     rows = {row.name: numbers(row) for row in fmqm.rows}
     outcomes = api.measure(lods[0], lods[1:], metric_settings(fmqm.settings), repeats=2)
-    assert {outcome.target.name: outcome.scores.tolist() for outcome in outcomes} == rows
+    assert {outcome.target.name: list(outcome.scores) for outcome in outcomes} == rows
     spaces = {row.name: row.space for row in fmqm.rows}
     assert spaces == {"Rock_LOD1": "world without location", "Rock_LOD2": "world"}
 
@@ -228,7 +228,7 @@ def test_own_modifiers(fmqm: ui.scene.FMQMScene, lods: list[bpy.types.Object]) -
     lod.modifiers.clear()
     select(lod)
     outcome = api.measure(lod, lod, QUICK, reference_without_modifiers=True)[0]
-    assert outcome.scores.tolist() == [1.0] * 5
+    assert list(outcome.scores) == [1.0] * 5
 
 
 def test_own_modifiers_in_edit_mode_and_switched_off(fmqm: ui.scene.FMQMScene, lods: list[bpy.types.Object]) -> None:
@@ -648,7 +648,7 @@ def test_python_api(lods: list[bpy.types.Object]) -> None:
     before = scenes.blocks()
     outcomes = api.measure(lods[0], lods, QUICK)
     assert scenes.blocks() == before
-    assert outcomes[0].scores.tolist() == [1.0] * 5
+    assert list(outcomes[0].scores) == [1.0] * 5
     assert not bpy.context.scene.fmqm.rows
     assert outcomes[1].triangles < outcomes[1].reference_triangles == 968
     assert outcomes[1].comparison.result.patch_scores.shape == (QUICK.patches, 5)

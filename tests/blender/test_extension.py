@@ -55,7 +55,7 @@ report["rows"] = [(row.name, json.loads(row.scores), row.error) for row in fmqm.
 from bl_ext.user_default.fmqm.fmqm_addon import api
 lods = [bpy.data.objects[f"Rock_LOD{level}"] for level in range(2)]
 outcome = api.measure(*lods, api.Settings(samples=8000, patches=40))[0]
-report["api"] = outcome.scores.tolist()
+report["api"] = list(outcome.scores)
 del fmqm, outcome
 for again in range(2):
     bpy.ops.preferences.addon_disable(module=module)

@@ -79,7 +79,7 @@ def self_scores(object_: bpy.types.Object, settings: Settings = SMALL) -> list[f
         reference = placed([object_], "extreme")
         measurement = Measurement(reference.world(), settings)
         measurement.prepare().run()
-        return measurement.compare(place(reference, placed([object_], "extreme")).mesh).run().scores.tolist()
+        return list(measurement.compare(place(reference, placed([object_], "extreme")).mesh).run().scores)
     finally:
         assert scenes.blocks() == before
 

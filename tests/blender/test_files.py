@@ -79,7 +79,7 @@ def test_kinds_without_materials_warn(monkeys: Path, kind: str) -> None:
 def self_score(mesh: MeshArrays, again: MeshArrays) -> list[float]:
     measurement = Measurement(mesh, TINY)
     measurement.prepare().run()
-    return measurement.compare(again).run().scores.tolist()
+    return list(measurement.compare(again).run().scores)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -121,7 +121,7 @@ def outcome(path: Path | str) -> float | str:
         assert len(str(error).splitlines()) == 1
         assert Path(path).name in str(error)
         return str(error)
-    assert len(set(scores.tolist())) == 1, scores
+    assert len(set(scores)) == 1, scores
     return float(scores[0])
 
 
@@ -147,7 +147,7 @@ def good_scores(folder: Path) -> list[float]:
     reference = load_placed(str(folder / "good_1.obj"))
     measurement = Measurement(reference.world(), TINY)
     measurement.prepare().run()
-    return measurement.compare(place(reference, load_placed(str(folder / "good_2.obj"))).mesh).run().scores.tolist()
+    return list(measurement.compare(place(reference, load_placed(str(folder / "good_2.obj"))).mesh).run().scores)
 
 
 @pytest.fixture(scope="module")

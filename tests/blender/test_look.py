@@ -20,7 +20,7 @@ from fmqm_addon.comparison.measurement import Comparison, Measurement
 from fmqm_addon.metric.color import decode_srgb, srgb_to_lab
 from fmqm_addon.metric.fields import Fields
 from fmqm_addon.metric.samples import Samples
-from fmqm_addon.metric.score import Result
+from fmqm_addon.metric.score import Result, Scores
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.spatial import dot
 from fmqm_addon.report.visual import colormap, layers, probe
@@ -150,7 +150,7 @@ def test_worst_patches_name_who_is_to_blame(measured: session.Measured) -> None:
     scores[:, 3] = 0.4  # low everywhere: nothing special
     scores[2] = [0.9, 0.45, 0.9, 0.4, 0.3]
     scores[0] = [0.9, 0.9, 0.9, 0.1, 0.2]
-    result = dataclasses.replace(measured.comparison.result, patch_scores=scores, scores=scores.mean(axis=0))
+    result = dataclasses.replace(measured.comparison.result, patch_scores=scores, scores=Scores(*scores.mean(axis=0)))
     worst = probe.worst_patches(result, 3)
     assert [(w.patch, w.blame, w.value) for w in worst[:2]] == [(0, "colorGraSSIM", 0.1), (2, "geoGraSSIM", 0.45)]
     assert [w.patch for w in worst] == [0, 2, 1]

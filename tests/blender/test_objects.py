@@ -181,7 +181,7 @@ def test_inputs_of_geometry_nodes_are_noticed() -> None:
 def test_kinds_score_1_against_themselves(make: Callable[[], bpy.types.Object]) -> None:
     object_ = make()
     (outcome,) = measuring(target_of(object_), [target_of(object_)], Question(Settings(samples=800, patches=8))).run()
-    assert outcome.error is None and outcome.scores.tolist() == [1.0] * 5
+    assert outcome.error is None and list(outcome.scores) == [1.0] * 5
 
 
 @pytest.mark.parametrize("kind", ["CAMERA", "ARMATURE", "LIGHT"])
@@ -430,7 +430,7 @@ def test_a_gltf_of_35_parts_is_one_asset(tmp_path: Path) -> None:
     assert sorted(look.name for look in asset.mesh.materials) == ["Blue", "Grey", "Red"]
     measurement = Measurement(asset.world(), Settings(samples=4000, patches=20))
     measurement.prepare().run()
-    assert measurement.compare(asset.world()).run().scores.tolist() == [1.0] * 5
+    assert list(measurement.compare(asset.world()).run().scores) == [1.0] * 5
     placement = place(asset, load_placed(str(joined)))
     assert placement.place == "world"
     np.testing.assert_allclose(measurement.compare(placement.mesh).run().scores, 1, atol=1e-3)

@@ -41,7 +41,7 @@ def prepared(reference: MeshArrays, settings: Settings, repeats: int = 1) -> Mea
 
 
 def scores(measurement: Measurement, distorted: MeshArrays) -> np.ndarray:
-    return measurement.compare(distorted).run().scores
+    return np.array(measurement.compare(distorted).run().scores)
 
 
 def model(shared_data: Path, name: str) -> Path:

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from fmqm_addon.metric.color import PlainColor, Texture, channels
 from fmqm_addon.metric.features import FieldValues, find_pairs, pool_features, unit_cosine
-from fmqm_addon.metric.score import COLUMNS, Evaluation, Progress, Result, Stepper
+from fmqm_addon.metric.score import COLUMNS, Evaluation, Progress, Result, Scores, Stepper, fmqm
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.surface import MeshArrays, prepare_surface
 
@@ -77,7 +77,7 @@ def same_bits(one: Result, other: Result) -> bool:
 
 
 def check_range(result: Result) -> None:
-    for table in (result.scores, result.patch_scores):
+    for table in (np.array(result.scores), result.patch_scores):
         assert np.isfinite(table).all()
         assert (table >= 0).all()
         assert (table <= 1).all()
@@ -107,7 +107,7 @@ VARIANTS: list[dict[str, Any]] = [
 def test_itself_is_exactly_1_under_every_option(name: str, variant: dict[str, Any]) -> None:
     mesh = textured(name)
     result = evaluate(mesh, mesh, replace(SMALL, **variant))
-    assert result.scores.tolist() == [1.0] * 5
+    assert list(result.scores) == [1.0] * 5
     assert (result.patch_scores == 1.0).all()
 
 
@@ -117,7 +117,7 @@ def test_itself_is_exactly_1_for_every_shape(name: str, scale: float) -> None:
     """Open, closed, loose, one triangle, slivers; fewer vertices than patches; in any unit."""
     mesh = moved(textured(name), scale, np.array([3.0, -2.0, 1.0]) * scale)
     result = evaluate(mesh, mesh, Settings(samples=640, patches=20, color_units=10))
-    assert result.scores.tolist() == [1.0] * 5
+    assert list(result.scores) == [1.0] * 5
     assert len(result.patches) <= 20
 
 
@@ -132,7 +132,7 @@ def test_itself_is_exactly_1_for_random_soups(seed: int) -> None:
     colors = (Texture(pixels, "mirror"), Texture(pixels, "clip", "closest"), PlainColor((0, 0, 0)))
     mesh = replace(mesh_arrays((positions, triangles), colors), corners=rng.normal(0, 2, (25, 3, 2)))
     result = evaluate(mesh, mesh, replace(SMALL, gradient_radius=[0.125, math.inf][seed % 2]))
-    assert result.scores.tolist() == [1.0] * 5
+    assert list(result.scores) == [1.0] * 5
 
 
 def test_itself_in_another_order_is_1() -> None:
@@ -180,7 +180,7 @@ def test_constant_colors(one: tuple[float, float, float], other: tuple[float, fl
     """0/0 is 1: equal plain colors cannot differ; no gradient on either side is no difference."""
     reference, distorted = (mesh_arrays(cube(2), (PlainColor(rgb),)) for rgb in (one, other))
     result = evaluate(reference, distorted, replace(SMALL, color_space=color_space))
-    geometry, gradient = result.scores[:2].tolist(), result.scores[3]
+    geometry, gradient = list(result.scores[:2]), result.scores[3]
     assert geometry == [1, 1]
     assert gradient == 1
     assert (result.scores[2] == 1) == (one == other)
@@ -199,7 +199,7 @@ def test_prepared_once_compared_twice() -> None:
     surfaces = [prepare_surface(mesh, NaiveQuery, ref.frame) for mesh in (distorted, reference, distorted)]
     first, itself, again = (evaluation.compare(each).run() for each in surfaces)
     assert same_bits(first, again)
-    assert itself.scores.tolist() == [1.0] * 5
+    assert list(itself.scores) == [1.0] * 5
     assert same_bits(first, evaluate(reference, distorted))
 
 
@@ -230,6 +230,17 @@ def test_scores_are_the_means_of_the_patch_table() -> None:
         np.testing.assert_allclose(result.scores, result.patch_scores.mean(axis=0), rtol=1e-15)
         assert np.array_equal(result.patch_scores[:, 4], pool_features(result.patch_scores[:, :4], pooling))
         assert result.patch_scores.shape == (10, len(COLUMNS))
+
+
+def test_fmqm_needs_arrays_and_any_query() -> None:
+    """From numpy arrays and a query without Blender to the five numbers, which have the paper's names."""
+    reference, distorted = pair()
+    scores = fmqm(reference, distorted, SMALL, NaiveQuery)
+    assert scores == evaluate(reference, distorted).scores
+    assert Scores._fields == COLUMNS == ("geoSSIM", "geoGraSSIM", "colorSSIM", "colorGraSSIM", "FMQM")
+    assert [getattr(scores, name) for name in COLUMNS] == list(scores)
+    assert {type(score) for score in scores} == {float} and 0 < scores.FMQM < 1
+    assert fmqm(reference, moved(reference, 1, np.zeros(3)), SMALL, NaiveQuery) == Scores(1, 1, 1, 1, 1)
 
 
 @pytest.mark.parametrize("color_space", ["rgb", "lab"])
@@ -362,7 +373,7 @@ def test_radius_and_thresholds_choose_the_members() -> None:
 )
 def test_an_option_changes_its_own_features_and_no_other(variant: dict[str, Any], changed: tuple[bool, ...]) -> None:
     base, other = (evaluate(*pair(), settings) for settings in (SMALL, replace(SMALL, **variant)))
-    assert tuple((base.scores[:4] != other.scores[:4]).tolist()) == changed
+    assert tuple(a != b for a, b in zip(base.scores[:4], other.scores[:4], strict=True)) == changed
     assert base.scores[4] != other.scores[4]
 
 
@@ -404,7 +415,7 @@ def test_more_distortion_scores_less(amounts: tuple[float, ...]) -> None:
         color.append(evaluate(reference, replace(reference, materials=materials(noisy))).scores)
     assert color[0][2] > color[1][2] > color[2][2]
     assert color[0][3] > color[1][3] > color[2][3]
-    assert all(scores[:2].tolist() == [1, 1] for scores in color)
+    assert all(list(scores[:2]) == [1, 1] for scores in color)
 
 
 # --- warnings, frames and the stepper ---------------------------------------------------------------------

@@ -193,7 +193,7 @@ def test_clean_closed_meshes_give_no_doubt_and_no_warning() -> None:
 def test_flipped_faces_are_seen_although_the_score_is_not_changed() -> None:
     ball = mesh_arrays(sphere())
     trust, result, *_ = assess(ball, turned(ball))
-    assert result.scores.tolist() == [1.0] * 5
+    assert list(result.scores) == [1.0] * 5
     assert values(trust.pair)["flipped"] == 1
     assert values(trust.distorted)["sign_in_doubt"] == 1  # inside out
     assert "100 %" in trust.warnings[0] and "look the other way" in trust.warnings[0]

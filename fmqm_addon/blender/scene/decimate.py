@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ...comparison.measurement import Measurement
 from ...metric.errors import FMQMError, MeshError, SettingsError
-from ...metric.score import COLUMNS, Progress, Stepper, Work, as_part
+from ...metric.score import Progress, Stepper, Work, as_part
 from ...metric.settings import FAST_SCORED_PATCHES, Settings
 from ...metric.surface import MeshArrays, weld
 from .target import placed
@@ -31,7 +31,6 @@ WELD_DISTANCE = 1e-6  # of the object's extent: float32 apart. With 0 the modifi
 
 T = TypeVar("T")
 
-_FMQM = COLUMNS.index("FMQM")
 _PREPARED = 0.1  # share of the progress
 _PER_STEP = 0.1  # of the rest: how many steps there will be is not known
 
@@ -187,7 +186,7 @@ class Search:
             triangles = len(mesh.triangles)
             comparing = self._measurements[quick].compare(mesh)
             compared = yield from as_part(comparing, done, (1 - done) * _PER_STEP, what)
-            fmqm = float(compared.scores[_FMQM])
+            fmqm = compared.scores.FMQM
         except MeshError:
             pass  # nothing is left of it: it misses any target
         step = Step(version, triangles, fmqm, quick)

@@ -13,8 +13,7 @@ from ...comparison.measurement import Comparison
 from ...comparison.pair import Answer, Question, answering, measurement_of
 from ...comparison.trust import Trust
 from ...metric.errors import FMQMError
-from ...metric.score import Progress, Stepper, Work, as_part
-from ...metric.spatial import Floats
+from ...metric.score import Progress, Scores, Stepper, Work, as_part
 from ..materials.images import TextureCache
 from ..materials.types import Reading
 from .target import Target, bakes, fingerprint, take
@@ -50,8 +49,8 @@ class Outcome:
         return None if self.answer is None else self.answer.comparison
 
     @property
-    def scores(self) -> Floats | None:
-        """(5,) float64 in the order of metric.score.COLUMNS; None where there is an error."""
+    def scores(self) -> Scores | None:
+        """Means over the patches and seeds; None where there is an error."""
         return None if self.comparison is None else self.comparison.scores
 
     @property
@@ -60,8 +59,8 @@ class Outcome:
         return None if self.comparison is None else self.comparison.trust
 
     @property
-    def reverse(self) -> Floats | None:
-        """(5,) float64 scores of the other direction; None where they were not asked for, or there is an error."""
+    def reverse(self) -> Scores | None:
+        """Scores of the other direction; None where they were not asked for, or there is an error."""
         return None if self.answer is None else self.answer.reverse
 
     @property

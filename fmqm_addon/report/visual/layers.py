@@ -229,7 +229,7 @@ def legend(
     ticks = tuple((k / (_TICKS - 1), text(low + (high - low) * k / (_TICKS - 1))) for k in range(_TICKS))
     if layer.kind != SCORE:
         return Legend(layer.label, subtitle, bar, ticks)
-    score = float(result.scores[COLUMNS.index(name)])
+    score = result.scores[COLUMNS.index(name)]
     place = min(max((score - low) / (high - low), 0.0), 1.0)
     heading = layer.label if layer.label == name else f"{layer.label} ({name})"
     return Legend(heading, subtitle, bar, ticks, (place, f"{score:.4f}"))
