@@ -18,7 +18,7 @@ from .blender.materials.types import Reading
 from .blender.scene.measure import Outcome, measuring
 from .blender.scene.target import target_of
 from .comparison.pair import Question
-from .metric.score import COLUMNS, Result, Scores
+from .metric.evaluation import COLUMNS, Result, Scores
 from .metric.settings import PRESETS, Settings
 
 __all__ = ["COLUMNS", "PRESETS", "Outcome", "Result", "Scores", "Settings", "measure"]
@@ -55,8 +55,8 @@ def measure(
 
     Returns:
         One outcome per distorted asset, in their order; `outcome.scores` are Scores, a named tuple in the order
-        of COLUMNS, or None with the reason in `outcome.error`. `outcome.comparison.result` is a metric.score.Result
-        with patches, samples and fields, `outcome.trust` a comparison.trust.Trust: how far to believe the scores.
+        of COLUMNS, or None with the reason in `outcome.error`. `outcome.comparison.result` is a Result of
+        metric.evaluation with patches, samples and fields, `outcome.trust` a comparison.trust.Trust: how far to believe the scores.
 
     Raises:
         TypeError: an asset is no object and no collection.

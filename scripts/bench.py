@@ -142,9 +142,9 @@ def query_floor(reference: str, distorted: str, samples: str) -> None:
     """Prints the seconds of the plain loops on both surfaces, and the reference's triangles."""
     from fmqm_addon.blender.files.load import load_mesh
     from fmqm_addon.blender.scene.bvh import BVHQuery
-    from fmqm_addon.metric.score import Evaluation
+    from fmqm_addon.metric.evaluation import Evaluation
+    from fmqm_addon.metric.geometry import morton_order
     from fmqm_addon.metric.settings import Settings
-    from fmqm_addon.metric.spatial import morton_order
     from fmqm_addon.metric.surface import prepare_surface
 
     ref = prepare_surface(load_mesh(reference), BVHQuery)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from ..comparison.alignment import Placed
     from ..comparison.measurement import Measurement
     from ..comparison.pair import Answer, Question
-    from ..metric.score import Stepper
+    from ..metric.stepper import Stepper
 
 T = TypeVar("T")
 # What the scripts can do about an error; the sidebar cannot.

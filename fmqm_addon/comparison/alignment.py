@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..metric.errors import MeshError
-from ..metric.spatial import Floats, cross
+from ..metric.geometry import Floats, cross
 from ..metric.surface import MeshArrays
 
 SPACES = ("auto", "world", "local")

@@ -15,11 +15,11 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..metric.color import Material
 from ..metric.fields import closest_on
-from ..metric.score import Progress, Stepper, Work, as_part
-from ..metric.spatial import Floats, Ints
+from ..metric.geometry import Floats, Ints
+from ..metric.stepper import Progress, Stepper, Work, as_part
 from ..metric.surface import MeshArrays, Surface
+from ..metric.texture import Material
 from .measurement import Comparison, Measurement
 
 How = Literal["materials", "nearest points"]

@@ -10,8 +10,9 @@ import numpy as np
 
 from ..blender.scene.bvh import BVHQuery
 from ..metric.errors import MeshError
-from ..metric.score import Evaluation, Progress, Result, Scores, Stepper, Work, as_part, as_work
+from ..metric.evaluation import Evaluation, Result, Scores
 from ..metric.settings import Settings
+from ..metric.stepper import Progress, Stepper, Work, as_part, as_work
 from ..metric.surface import MeshArrays, Surface, preparing_surface
 from .trust import Fact, Trust, assessing, surface_facts
 

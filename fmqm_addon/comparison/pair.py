@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from ..blender.materials.types import MAX_BAKE, Reading
 from ..blender.trust import known_facts
 from ..metric.errors import SettingsError
-from ..metric.score import Scores, Stepper, Work, as_part
+from ..metric.evaluation import Scores
 from ..metric.settings import Settings
+from ..metric.stepper import Stepper, Work, as_part
 from ..metric.surface import Surface
 from .alignment import SPACES, Placed, Placement, place
 from .attribution import Attribution, attribute

@@ -15,11 +15,11 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..metric.color import MISSING, ImageFacts
+from ..metric.evaluation import Result
 from ..metric.fields import Fields, closest_on
-from ..metric.score import Result
-from ..metric.spatial import Floats, Ints, dot, morton_order, ranges
+from ..metric.geometry import Floats, Ints, dot, morton_order, ranges
 from ..metric.surface import Surface, triangle_areas, triangle_normals
+from ..metric.texture import MISSING, ImageFacts
 
 # What should stop someone from believing the number. Shares.
 SIGN_IN_DOUBT = 0.01  # of samples whose side is doubtful on one mesh and not the same on both: the SDF's sign is noise

@@ -10,76 +10,23 @@ fmqm() does this at once. One preparation serves any number of comparisons, all 
 
 from __future__ import annotations
 
-import time
-from collections.abc import Generator
 from dataclasses import dataclass
-from typing import Generic, NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
-from .color import channel_weights, channels
+from .colorspace import channel_weights, channels
 from .errors import MeshError
 from .features import FieldValues, features_of_patches, pool_features
 from .fields import Fields, evaluate_fields
+from .geometry import Floats, Ints, morton_order
 from .patches import Patch, PatchMesh, build_patch_mesh, choose_centers, grow_patches
-from .samples import Samples, draw_samples, join_samples
+from .sampling import Samples, draw_samples, join_samples
 from .settings import Settings
-from .spatial import Floats, Ints, morton_order
+from .stepper import Progress, Stepper, Work, as_work
 from .surface import Frame, MeshArrays, QueryBuilder, Surface, prepare_surface
 
 _PATCHES_AT_ONCE = 8  # some milliseconds of work
-
-T = TypeVar("T")
-
-
-@dataclass(frozen=True)
-class Progress:
-    """What a step has worked on, and the share of the whole stepper that is done, in [0, 1]."""
-
-    stage: str
-    done: float
-
-
-Work = Generator[Progress, None, T]
-
-
-class Stepper(Generic[T]):
-    """Work in steps of some milliseconds: for a loop, a progress bar or a timer alike.
-
-    Attributes:
-        progress: where the work is. seconds: time spent, by stage. result: there once step() is False.
-    """
-
-    def __init__(self, work: Work[T]) -> None:
-        self._work = work
-        self._done = False
-        self.progress = Progress("", 0.0)
-        self.seconds: dict[str, float] = {}
-        self.result: T
-
-    def step(self) -> bool:
-        """Do a little; True while there is more to do."""
-        if self._done:
-            return False
-        began = time.perf_counter()
-        more = True
-        try:
-            self.progress = next(self._work)
-        except StopIteration as end:
-            self.result = end.value
-            self._done, more = True, False
-        stage = self.progress.stage
-        self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - began
-        return more
-
-    def run(self) -> T:
-        while self.step():
-            pass
-        return self.result
-
-    def cancel(self) -> None:
-        self._work.close()
-        self._done = True
 
 
 class Scores(NamedTuple):
@@ -252,24 +199,6 @@ def fmqm(reference: MeshArrays, distorted: MeshArrays, settings: Settings, build
     evaluation = Evaluation(surface, settings)
     evaluation.prepare().run()
     return evaluation.compare(prepare_surface(distorted, build_query, surface.frame)).run().scores
-
-
-def as_part(stepper: Stepper[T], first: float, share: float, stage: str | None = None) -> Work[T]:
-    """The steps of a stepper as a part of larger work, which may call all of them one stage; ends in its result."""
-    while stepper.step():
-        yield Progress(stage or stepper.progress.stage, first + share * stepper.progress.done)
-    return stepper.result
-
-
-def as_work(work: Generator[float, None, T], stage: str, first: float, last: float) -> Work[T]:
-    """Something that yields its own share done, as the part of a stepper's work from first to last."""
-    while True:
-        try:
-            done = next(work)
-        except StopIteration as end:
-            result: T = end.value
-            return result
-        yield Progress(stage, first + (last - first) * done)
 
 
 def _in_diagonals(fields: Fields, values: Floats, here: slice, diagonal: Floats) -> FieldValues:

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .geometry import Floats, Ints, dot
 from .settings import Settings
-from .spatial import Floats, Ints, dot
 
 EPSILON_SDF = 1e-12  # V-E1: decides 0/0 as 1
 EPSILON_COLOR = 1e-10  # V-E3: the same

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .spatial import Floats, Ints, closest_on_triangles, cross, dot, ranges
+from .geometry import Floats, Ints, closest_on_triangles, cross, dot, ranges
 from .surface import Surface, triangle_normals
 
 # Below the resolution of a float32 tree in a box of diagonal 1, p - p_n has no direction: p = p_n.

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .geometry import Floats, Ints, dot, morton_order, ranges
 from .settings import Settings
-from .spatial import Floats, Ints, dot, morton_order, ranges
 from .surface import Surface, triangle_areas
 
 FPS_TIE = 1e-5  # V-B: distances this close, relatively, are equal; the lowest vertex index wins

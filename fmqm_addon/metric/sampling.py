@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .geometry import Floats, Ints
 from .patches import Patch, PatchMesh
 from .settings import Settings
-from .spatial import Floats, Ints
 from .surface import triangle_normals
 
 PATCH_CAP = 1.1  # V-C: no patch takes more than this many times its even share of the samples
@@ -43,7 +43,7 @@ def draw_samples(mesh: PatchMesh, patch: Patch, total_area: float, settings: Set
     """Samples of a patch: they depend on the seed, the settings and this patch alone.
 
     Face f gets N_f = S_f / S_local N_local samples, floor or ceiling, by systematic resampling; uniform
-    barycentric coordinates; offsets along the face normal from N(0, (sigma L)^2).
+    barycentric coordinates; offsets along the face normal from N(0, (sigma L)^2): equations (12) and (13).
     """
     rng = np.random.default_rng([settings.seed, patch.center])
     count = sample_count(patch, total_area, settings)

@@ -10,9 +10,9 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from .color import Material
 from .errors import MeshError
-from .spatial import Floats, Ints, cross, dot
+from .geometry import Floats, Ints, cross, dot
+from .texture import Material
 
 T = TypeVar("T")
 
@@ -122,7 +122,7 @@ class Preparation:
 
 @dataclass(frozen=True)
 class Surface:
-    """A prepared surface (METRIC "Preparing the two surfaces").
+    """A prepared surface (docs/metric.md, "The two surfaces").
 
     Attributes:
         vertices: (V, 3) float64 in the metric's frame; no two are equal, each is used.

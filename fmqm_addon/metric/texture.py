@@ -1,30 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What color a surface has: textures, plain colors, and the color spaces they are compared in."""
+"""What color a surface has: its materials, plain colors and textures."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from .colorspace import decode_srgb, encode_srgb
+from .geometry import Floats
 
 Extension = Literal["repeat", "extend", "clip", "mirror"]
 Interpolation = Literal["linear", "closest", "cubic"]
 Fold = Literal["none", "wrap", "pingpong"]
 
-LAB_SCALE = 100.0  # L* of white becomes 1, as RGB's
-LAB_WEIGHTS = (6.0, 1.0, 1.0)  # supplement, "Ablations": L, a, b
-RGB_WEIGHTS = (1.0, 1.0, 1.0)  # V-E3: plain mean over r, g, b
 FAR = 4.0  # image sides; no interpolation reaches farther, were the image a single pixel
 MISSING = (1.0, 0.0, 1.0)  # linear light: magenta, what Blender shows for an image that is not there
-_D65 = np.array([0.95047, 1.0, 1.08883])  # CIE 1931 2 degree white, Y = 1
-_RGB_TO_XYZ = np.array(  # IEC 61966-2-1
-    [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]]
-)
 
 
 class Color(Protocol):
@@ -39,20 +33,6 @@ class Alpha(Protocol):
 
     def opacity(self, values: Floats) -> Floats:
         """(N,) float64 in [0, 1] for (N, K) interpolated values."""
-
-
-class Light(Protocol):
-    """A color while it is still calculated with: what colors are made of."""
-
-    def light_at(self, values: Floats) -> Floats:
-        """(N, 3) float64 linear light, finite, not clipped, for (N, K) interpolated values."""
-
-
-class Value(Protocol):
-    """A number while it is still calculated with: what opacities are made of."""
-
-    def value_at(self, values: Floats) -> Floats:
-        """(N,) float64, finite, not clipped, for (N, K) interpolated values."""
 
 
 How = Literal["read", "baked", "plain", "given", "none"]
@@ -110,162 +90,6 @@ class PlainColor:
 
     def lookup(self, values: Floats) -> Floats:
         return np.broadcast_to(np.asarray(self.rgb, np.float64), (len(values), 3))
-
-
-@dataclass(frozen=True)
-class Encoded:
-    """Light as it is displayed: clipped to [0, 1] and encoded (the Standard view transform)."""
-
-    light: Light
-
-    def lookup(self, values: Floats) -> Floats:
-        return encode_srgb(_known(self.light.light_at(values)))
-
-
-def _known(numbers: Floats) -> Floats:
-    """Long chains of huge factors may overflow to what is no number; that is 0."""
-    return numbers if np.isfinite(numbers).all() else np.nan_to_num(numbers)
-
-
-@dataclass(frozen=True)
-class Opacity:
-    """A value as an opacity, clipped to [0, 1]."""
-
-    value: Value
-
-    def opacity(self, values: Floats) -> Floats:
-        return np.clip(_known(self.value.value_at(values)), 0, 1)
-
-
-@dataclass(frozen=True)
-class PlainLight:
-    """One color everywhere: rgb in linear light, any finite numbers."""
-
-    rgb: tuple[float, float, float]
-
-    def light_at(self, values: Floats) -> Floats:
-        return np.broadcast_to(np.asarray(self.rgb, np.float64), (len(values), 3))
-
-
-@dataclass(frozen=True)
-class VertexColor:
-    """A color attribute, which holds linear light: four channels of the corner values, from the given one on."""
-
-    channel: int
-
-    def light_at(self, values: Floats) -> Floats:
-        return values[:, self.channel : self.channel + 3]
-
-    def value_at(self, values: Floats) -> Floats:
-        """Its alpha."""
-        return values[:, self.channel + 3]
-
-
-@dataclass(frozen=True)
-class Mix:
-    """Two colors in linear light: first (1 - factor) + factor second, or, multiplied, + factor first second.
-
-    Attributes:
-        factor: any finite number.
-        clamp: of the result, to [0, 1].
-    """
-
-    first: Light
-    second: Light
-    factor: float
-    multiply: bool = False
-    clamp: bool = False
-
-    def light_at(self, values: Floats) -> Floats:
-        first, second = self.first.light_at(values), self.second.light_at(values)
-        mixed = first * (1 - self.factor) + (first * second if self.multiply else second) * self.factor
-        return np.clip(mixed, 0, 1) if self.clamp else mixed
-
-
-@dataclass(frozen=True)
-class Scaled:
-    """A color times a scale plus a bias, for each of r, g, b, in linear light."""
-
-    light: Light
-    scale: tuple[float, float, float]
-    bias: tuple[float, float, float] = (0.0, 0.0, 0.0)
-
-    def light_at(self, values: Floats) -> Floats:
-        return self.light.light_at(values) * np.asarray(self.scale) + np.asarray(self.bias)
-
-
-@dataclass(frozen=True)
-class Grey:
-    """A value as a color."""
-
-    value: Value
-
-    def light_at(self, values: Floats) -> Floats:
-        return np.repeat(self.value.value_at(values)[:, None], 3, axis=1)
-
-
-@dataclass(frozen=True)
-class Constant:
-    """One number everywhere."""
-
-    number: float
-
-    def value_at(self, values: Floats) -> Floats:
-        return np.full(len(values), self.number)
-
-
-@dataclass(frozen=True)
-class Weighted:
-    """The sum of weights times r, g, b in linear light: a channel of a color, or its luminance."""
-
-    light: Light
-    weights: tuple[float, float, float]
-
-    def value_at(self, values: Floats) -> Floats:
-        return self.light.light_at(values) @ np.asarray(self.weights)
-
-
-@dataclass(frozen=True)
-class ImageAlpha:
-    """The alpha of a texture."""
-
-    texture: Texture | Tiles
-
-    def value_at(self, values: Floats) -> Floats:
-        return self.texture.alpha_at(values)
-
-
-Operation = Literal["add", "subtract", "multiply", "less", "greater", "round", "minimum", "maximum"]
-
-
-@dataclass(frozen=True)
-class Arithmetic:
-    """Two values made one; "round" takes the first. "less" and "greater" are 0 or 1.
-
-    Attributes:
-        clamp: of the result, to [0, 1].
-    """
-
-    operation: Operation
-    first: Value
-    second: Value
-    clamp: bool = False
-
-    def value_at(self, values: Floats) -> Floats:
-        found = _OPERATIONS[self.operation](self.first.value_at(values), self.second.value_at(values))
-        return np.clip(found, 0, 1) if self.clamp else found
-
-
-_OPERATIONS: dict[Operation, Callable[[Floats, Floats], Floats]] = {
-    "add": np.add,
-    "subtract": np.subtract,
-    "multiply": np.multiply,
-    "less": lambda a, b: (a < b).astype(np.float64),
-    "greater": lambda a, b: (a > b).astype(np.float64),
-    "round": lambda a, b: np.floor(a + 0.5),
-    "minimum": np.minimum,
-    "maximum": np.maximum,
-}
 
 
 @dataclass(frozen=True)
@@ -458,35 +282,3 @@ def _cubic_weights(t: Floats) -> list[Floats]:
     """The uniform cubic B-spline of the pixels at -1, 0, 1, 2 for places t in [0, 1)."""
     s = 1 - t
     return [w[:, None] / 6 for w in (s**3, 3 * t**3 - 6 * t**2 + 4, 3 * s**3 - 6 * s**2 + 4, t**3)]
-
-
-def encode_srgb(linear: NDArray[Any]) -> NDArray[np.float64]:
-    """Linear light to the sRGB encoding, clipped to [0, 1] (IEC 61966-2-1)."""
-    x = np.clip(np.asarray(linear, np.float64), 0, 1)
-    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
-
-
-def decode_srgb(encoded: NDArray[Any]) -> NDArray[np.float64]:
-    """The sRGB encoding, in [0, 1], to linear light (IEC 61966-2-1)."""
-    x = np.asarray(encoded, np.float64)
-    return np.where(x <= 0.04045, x / 12.92, ((x + 0.055) / 1.055) ** 2.4)
-
-
-def srgb_to_lab(rgb: NDArray[Any]) -> NDArray[np.float64]:
-    """(N, 3) encoded sRGB in [0, 1] to CIE L*a*b* under D65, divided by 100."""
-    xyz = decode_srgb(rgb) @ (_RGB_TO_XYZ / _D65[:, None]).T
-    f = np.where(xyz > (6 / 29) ** 3, np.cbrt(xyz), xyz / (3 * (6 / 29) ** 2) + 4 / 29)
-    x, y, z = f.T
-    return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=1) / LAB_SCALE
-
-
-def channels(ncf: NDArray[np.float32], color_space: str) -> NDArray[np.float64]:
-    """The (N, 3) channels that features compare: exactly the saved float32 NCF, or its Lab rounded alike."""
-    if color_space == "lab":
-        return srgb_to_lab(ncf).astype(np.float32).astype(np.float64)
-    return ncf.astype(np.float64)
-
-
-def channel_weights(color_space: str) -> NDArray[np.float64]:
-    """Weights over the channels, summing to 1 when divided by their sum."""
-    return np.array(LAB_WEIGHTS if color_space == "lab" else RGB_WEIGHTS)

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ..metric.score import COLUMNS, Result
-from ..metric.spatial import Floats
+from ..metric.evaluation import COLUMNS, Result
+from ..metric.geometry import Floats
 from ..metric.surface import Surface
 
 SEED_NOISE = 0.01  # FMQM of other seeds differs by less than this

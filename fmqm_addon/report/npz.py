@@ -7,7 +7,7 @@ import json
 
 import numpy as np
 
-from ..metric.score import Result
+from ..metric.evaluation import Result
 from .atomic_files import replaced
 
 

@@ -14,7 +14,7 @@ from itertools import chain
 from typing import Any
 
 from ..metric.errors import one_line
-from ..metric.score import COLUMNS, Scores
+from ..metric.evaluation import COLUMNS, Scores
 from .trust_table import Report, trust_text
 
 SHOWN = ("FMQM", *(name for name in COLUMNS if name != "FMQM"))  # the score first, then its features

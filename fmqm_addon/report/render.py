@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..metric.errors import FMQMError
-from ..metric.score import COLUMNS, Result
-from ..metric.spatial import Floats, Ints, closest_on_triangles, dot
+from ..metric.evaluation import COLUMNS, Result
+from ..metric.geometry import Floats, Ints, closest_on_triangles, dot
 from ..metric.surface import Surface, triangle_normals
 from .atomic_files import replaced
 from .visual.colormap import NO_PATCH, score_colors

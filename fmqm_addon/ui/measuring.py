@@ -15,7 +15,7 @@ from ..blender.scene.measure import Outcome, measuring
 from ..blender.scene.target import Target, target_of
 from ..comparison.pair import Question
 from ..metric.errors import FMQMError
-from ..metric.score import Stepper
+from ..metric.stepper import Stepper
 from ..report.trust_table import trust_dict
 from . import session, stale
 from .inputs import reference_of

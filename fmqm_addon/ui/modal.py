@@ -9,7 +9,7 @@ from typing import Any
 
 import bpy
 
-from ..metric.score import Stepper
+from ..metric.stepper import Stepper
 from . import session, stale
 
 SLICE = 0.035  # seconds of work per tick of the timer: the window stays smooth

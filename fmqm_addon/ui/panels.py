@@ -9,7 +9,7 @@ import bpy
 from bl_ui.utils import PresetPanel
 
 from ..comparison.alignment import PLACE_LABELS
-from ..metric.score import COLUMNS
+from ..metric.evaluation import COLUMNS
 from ..report.records import SHOWN
 from ..report.trust_table import Line, trust_lines
 from . import session

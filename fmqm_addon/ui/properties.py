@@ -13,7 +13,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, Po
 
 from ..blender.scene.members import is_measured
 from ..comparison.alignment import SPACES
-from ..metric.score import COLUMNS
+from ..metric.evaluation import COLUMNS
 from ..metric.settings import FAST_SCORED_PATCHES, SETTING_NAMES, Settings
 from ..report.trust_table import Report
 
@@ -95,7 +95,7 @@ def active_row(scene: bpy.types.Scene) -> FMQMRow | None:
 
 
 def row_scores(row: FMQMRow) -> dict[str, float] | None:
-    """The five scores by the names of metric.score.COLUMNS, in double precision; None for a row with an error."""
+    """The five scores by the names of metric.evaluation.COLUMNS, in double precision; None for a row with an error."""
     return _columns(row.scores)
 
 

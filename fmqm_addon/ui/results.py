@@ -12,7 +12,7 @@ from bpy.props import EnumProperty, StringProperty
 
 from .. import VERSION
 from ..metric.errors import FMQMError
-from ..metric.score import Scores
+from ..metric.evaluation import Scores
 from ..metric.settings import PRESETS, SETTING_NAMES, Settings
 from ..report.atomic_files import write_text
 from ..report.npz import save_fields

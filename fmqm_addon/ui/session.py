@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ..comparison.measurement import Comparison
-from ..metric.spatial import Floats
+from ..metric.geometry import Floats
 from ..metric.surface import Surface
 
 

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from ..blender.display import scene_objects, viewport
 from ..metric.errors import FMQMError
+from ..metric.evaluation import Result
 from ..metric.fields import Fields
-from ..metric.score import Result
-from ..metric.spatial import Floats, Ints, cross
+from ..metric.geometry import Floats, Ints, cross
 from ..report.visual import layers, probe
 from . import overlay, properties, session
 

@@ -19,8 +19,9 @@ from fmqm_addon import api, ui
 from fmqm_addon.blender.scene import measure, target
 from fmqm_addon.blender.scene.target import target_of
 from fmqm_addon.metric.errors import SettingsError
-from fmqm_addon.metric.score import COLUMNS, Progress, Stepper, Work
+from fmqm_addon.metric.evaluation import COLUMNS
 from fmqm_addon.metric.settings import Settings
+from fmqm_addon.metric.stepper import Progress, Stepper, Work
 from fmqm_addon.ui import inputs, measuring, panels, results, session, stale
 from fmqm_addon.ui.modal import SteppedOperator
 from fmqm_addon.ui.properties import item_target, metric_settings, row_scores

@@ -19,9 +19,10 @@ from fmqm_addon.blender.materials.image_headers import Limits
 from fmqm_addon.blender.materials.types import Reading, Unread
 from fmqm_addon.blender.scene.bvh import BVHQuery
 from fmqm_addon.blender.scene.mesh_arrays import mesh_arrays
-from fmqm_addon.metric.color import Texture, decode_srgb, encode_srgb
+from fmqm_addon.metric.colorspace import decode_srgb, encode_srgb
 from fmqm_addon.metric.errors import MeshError
 from fmqm_addon.metric.surface import prepare_surface
+from fmqm_addon.metric.texture import Texture
 
 from . import scenes
 

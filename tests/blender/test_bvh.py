@@ -8,7 +8,7 @@ import pytest
 
 from fmqm_addon.blender.scene.bvh import BVHQuery
 from fmqm_addon.metric.fields import count_crossings
-from fmqm_addon.metric.spatial import closest_on_triangles
+from fmqm_addon.metric.geometry import closest_on_triangles
 from fmqm_addon.metric.surface import MeshArrays, prepare_surface
 
 from . import scenes

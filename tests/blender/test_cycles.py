@@ -16,7 +16,7 @@ from fmqm_addon.blender.materials.read_material import read_look
 from fmqm_addon.blender.materials.types import Look, Reading, Unread
 from fmqm_addon.blender.scene.bvh import BVHQuery
 from fmqm_addon.blender.scene.mesh_arrays import mesh_arrays
-from fmqm_addon.metric.color import encode_srgb
+from fmqm_addon.metric.colorspace import encode_srgb
 from fmqm_addon.metric.surface import Surface, prepare_surface
 
 from . import scenes

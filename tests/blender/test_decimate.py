@@ -38,8 +38,8 @@ from fmqm_addon.blender.scene.decimate import (
     scene_reader,
 )
 from fmqm_addon.metric.errors import FMQMError, MeshError, SettingsError
-from fmqm_addon.metric.score import Progress
 from fmqm_addon.metric.settings import Settings
+from fmqm_addon.metric.stepper import Progress
 from fmqm_addon.metric.surface import MeshArrays, finish
 from fmqm_addon.ui import decimate as ui_decimate
 

@@ -17,10 +17,10 @@ from fmqm_addon.blender.files import load as files
 from fmqm_addon.blender.files.load import SUFFIXES, load_mesh, split_spec
 from fmqm_addon.blender.materials.types import Reading
 from fmqm_addon.comparison.measurement import Measurement
-from fmqm_addon.metric.color import Texture
 from fmqm_addon.metric.errors import FileError, FMQMError, MeshError
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.surface import MeshArrays
+from fmqm_addon.metric.texture import Texture
 
 from . import scenes
 

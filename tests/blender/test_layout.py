@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from fmqm_addon.blender.baking import atlas
 from fmqm_addon.blender.baking.atlas import Layout, new_layout, own_layout
-from fmqm_addon.metric.color import Texture
 from fmqm_addon.metric.errors import MeshError
+from fmqm_addon.metric.texture import Texture
 
 QUAD = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], float)
 

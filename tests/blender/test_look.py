@@ -17,12 +17,12 @@ import fmqm_addon
 from fmqm_addon.blender.display import scene_objects, viewport
 from fmqm_addon.blender.scene.mesh_arrays import mesh_arrays
 from fmqm_addon.comparison.measurement import Comparison, Measurement
-from fmqm_addon.metric.color import decode_srgb, srgb_to_lab
+from fmqm_addon.metric.colorspace import decode_srgb, srgb_to_lab
+from fmqm_addon.metric.evaluation import Result, Scores
 from fmqm_addon.metric.fields import Fields
-from fmqm_addon.metric.samples import Samples
-from fmqm_addon.metric.score import Result, Scores
+from fmqm_addon.metric.geometry import dot
+from fmqm_addon.metric.sampling import Samples
 from fmqm_addon.metric.settings import Settings
-from fmqm_addon.metric.spatial import dot
 from fmqm_addon.report.visual import colormap, layers, probe
 from fmqm_addon.ui import overlay, session, show
 

@@ -13,8 +13,8 @@ from fmqm_addon.blender.materials.images import TextureCache
 from fmqm_addon.blender.materials.read_material import plain_look, read_look
 from fmqm_addon.blender.materials.types import Layer, Look, Reading, Unread
 from fmqm_addon.blender.scene.mesh_arrays import mesh_arrays
-from fmqm_addon.metric.color import PlainColor, Texture
 from fmqm_addon.metric.errors import MeshError
+from fmqm_addon.metric.texture import PlainColor, Texture
 
 from . import scenes
 

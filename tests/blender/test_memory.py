@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from fmqm_addon.comparison.memory import peak_bytes, peak_text
-from fmqm_addon.metric.color import Material, Texture
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.surface import MeshArrays
+from fmqm_addon.metric.texture import Material, Texture
 
 from .script import SCORE
 

@@ -17,9 +17,9 @@ from fmqm_addon.blender.materials.images import TextureCache
 from fmqm_addon.blender.materials.types import Reading
 from fmqm_addon.blender.scene.bvh import BVHQuery
 from fmqm_addon.blender.scene.mesh_arrays import mesh_arrays, to_bake
-from fmqm_addon.metric.color import Texture
 from fmqm_addon.metric.errors import MeshError
 from fmqm_addon.metric.surface import prepare_surface
+from fmqm_addon.metric.texture import Texture
 
 from . import scenes
 

@@ -27,7 +27,7 @@ from fmqm_addon.blender.scene.target import fingerprint, take, target_of
 from fmqm_addon.comparison.alignment import place
 from fmqm_addon.comparison.measurement import Measurement
 from fmqm_addon.comparison.pair import Question
-from fmqm_addon.metric.color import decode_srgb
+from fmqm_addon.metric.colorspace import decode_srgb
 from fmqm_addon.metric.errors import MeshError
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.surface import MeshArrays

@@ -17,9 +17,9 @@ import numpy as np
 import pytest
 
 from fmqm_addon.blender.scene.bvh import BVHQuery
-from fmqm_addon.metric.color import Material, PlainColor, Texture
 from fmqm_addon.metric.errors import FileError, FMQMError
 from fmqm_addon.metric.surface import MeshArrays, Surface, prepare_surface
+from fmqm_addon.metric.texture import Material, PlainColor, Texture
 from fmqm_addon.report import render as rendering
 from fmqm_addon.report.html import pictures as pair_pictures
 from fmqm_addon.report.html.chain_curve import Level, curve_svg

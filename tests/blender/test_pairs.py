@@ -20,7 +20,7 @@ from fmqm_addon.blender.scene.members import scene_members
 from fmqm_addon.blender.scene.mesh_arrays import mesh_arrays
 from fmqm_addon.comparison.measurement import Measurement
 from fmqm_addon.metric.errors import FileError
-from fmqm_addon.metric.score import COLUMNS
+from fmqm_addon.metric.evaluation import COLUMNS
 from fmqm_addon.metric.settings import PRESETS, Settings
 from fmqm_addon.metric.surface import MeshArrays
 

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from fmqm_addon.blender.scene.bvh import BVHQuery
-from fmqm_addon.metric.color import Material, Texture, srgb_to_lab
+from fmqm_addon.metric.colorspace import srgb_to_lab
 from fmqm_addon.metric.errors import FileError, FMQMError
-from fmqm_addon.metric.score import COLUMNS, Evaluation, Result
+from fmqm_addon.metric.evaluation import COLUMNS, Evaluation, Result
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.surface import Frame, MeshArrays, Surface, prepare_surface
+from fmqm_addon.metric.texture import Material, Texture
 from fmqm_addon.report import render as rendering
 from fmqm_addon.report.render import Camera, render, score_by_face, score_colors, write_picture
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fmqm_addon.blender.display import scene_objects, viewport
-from fmqm_addon.metric.color import decode_srgb
+from fmqm_addon.metric.colorspace import decode_srgb
 
 from . import scenes
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from fmqm_addon.comparison.alignment import APART, Placed, misfit, moved, place, place_counts, unit_factor
-from fmqm_addon.metric.color import PlainColor
 from fmqm_addon.metric.errors import MeshError
 from fmqm_addon.metric.surface import MeshArrays
+from fmqm_addon.metric.texture import PlainColor
 
 TURN = np.array([[0.0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])  # a quarter about Z
 

@@ -12,8 +12,8 @@ import pytest
 from fmqm_addon.blender.files.load import load_mesh
 from fmqm_addon.blender.scene.bvh import BVHQuery
 from fmqm_addon.comparison.measurement import Measurement
+from fmqm_addon.metric.geometry import Floats, Ints
 from fmqm_addon.metric.settings import Settings
-from fmqm_addon.metric.spatial import Floats, Ints
 
 LONGEST = 0.01  # of the whole, 10 s or so: a tenth of a second. A ratio, since machines are noisy
 RUNS = 2  # the same steps; what else the machine does does not strike the same one twice

@@ -18,7 +18,7 @@ from fmqm_addon import api
 from fmqm_addon.blender.files.load import load_mesh
 from fmqm_addon.comparison.measurement import Measurement
 from fmqm_addon.comparison.trust import Fact
-from fmqm_addon.metric.score import COLUMNS
+from fmqm_addon.metric.evaluation import COLUMNS
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.surface import MeshArrays
 from fmqm_addon.report.trust_table import trust_dict

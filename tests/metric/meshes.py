@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from fmqm_addon.metric.color import Color, Material, PlainColor, Texture
-from fmqm_addon.metric.score import Evaluation, Result
+from fmqm_addon.metric.evaluation import Evaluation, Result
+from fmqm_addon.metric.geometry import Floats, Ints
 from fmqm_addon.metric.settings import Settings
-from fmqm_addon.metric.spatial import Floats, Ints
 from fmqm_addon.metric.surface import Frame, MeshArrays, Surface, prepare_surface
+from fmqm_addon.metric.texture import Color, Material, PlainColor, Texture
 
 from .oracles import NaiveQuery
 

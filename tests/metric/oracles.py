@@ -10,10 +10,10 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from fmqm_addon.metric.color import Texture
 from fmqm_addon.metric.features import FieldValues
+from fmqm_addon.metric.geometry import Floats, Ints
 from fmqm_addon.metric.settings import Settings
-from fmqm_addon.metric.spatial import Floats, Ints
+from fmqm_addon.metric.texture import Texture
 
 Row = Sequence[float] | Floats
 
@@ -258,7 +258,7 @@ def unit_members(
 
 
 def s_of(a: Row, b: Row, e: float) -> float:
-    """METRIC "Four features": s(a, b) from population moments."""
+    """Equations (15) to (18), as docs/metric.md has them: s(a, b) from population moments."""
     n = len(a)
     mean_a, mean_b = math.fsum(a) / n, math.fsum(b) / n
     dev_a = math.sqrt(math.fsum((x - mean_a) ** 2 for x in a) / n)
@@ -314,7 +314,7 @@ def gradient_cosines(positions: Floats, nearest_r: Floats, nearest_d: Floats) ->
 def features_by_loop(
     positions: Floats, ref: FieldValues, dist: FieldValues, units: Ints, weights: Floats, settings: Settings
 ) -> list[float]:
-    """METRIC "Four features of a patch", sentence by sentence; lengths in patch diagonals."""
+    """The four features of a patch (V-E, docs/metric.md), sentence by sentence; lengths in patch diagonals."""
     normal: list[float] = []
     tangent: list[float] = []
     for unit in units.tolist():

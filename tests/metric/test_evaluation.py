@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Generator
 from dataclasses import replace
 from typing import Any
 
@@ -14,11 +13,13 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-from fmqm_addon.metric.color import PlainColor, Texture, channels
+from fmqm_addon.metric.colorspace import channels
+from fmqm_addon.metric.evaluation import COLUMNS, Evaluation, Result, Scores, fmqm
 from fmqm_addon.metric.features import FieldValues, find_pairs, pool_features, unit_cosine
-from fmqm_addon.metric.score import COLUMNS, Evaluation, Progress, Result, Scores, Stepper, fmqm
 from fmqm_addon.metric.settings import Settings
+from fmqm_addon.metric.stepper import Stepper
 from fmqm_addon.metric.surface import MeshArrays, prepare_surface
+from fmqm_addon.metric.texture import PlainColor, Texture
 
 from .meshes import (
     SMALL,
@@ -246,7 +247,7 @@ def test_fmqm_needs_arrays_and_any_query() -> None:
 @pytest.mark.parametrize("color_space", ["rgb", "lab"])
 @pytest.mark.parametrize("radius", [0.125, math.inf])
 def test_the_patch_table_follows_from_the_saved_fields(color_space: str, radius: float) -> None:
-    """From what a result holds, METRIC's formulas give its table again: lengths in each patch's own diagonal."""
+    """From what a result holds, the formulas give its table again: lengths in each patch's own diagonal."""
     settings = Settings(
         samples=320,
         patches=5,
@@ -471,23 +472,3 @@ def test_a_canceled_preparation_leaves_nothing_prepared() -> None:
     stepper.cancel()
     with pytest.raises(RuntimeError, match="prepare"):
         evaluation.compare(ref)
-
-
-def counting() -> Generator[Progress, None, int]:
-    yield Progress("half", 0.5)
-    return 7
-
-
-def test_a_stepper_steps_and_ends_with_its_result() -> None:
-    stepper = Stepper(counting())
-    assert stepper.step()
-    assert stepper.progress == Progress("half", 0.5)
-    assert not stepper.step()
-    assert stepper.result == 7
-
-
-def test_a_result_stays() -> None:
-    stepper = Stepper(counting())
-    stepper.run()
-    stepper.step()
-    assert stepper.result == 7

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The four similarities (V-E) against METRIC's formulas in plain loops, and by hand."""
+"""The four similarities (V-E) against the formulas of docs/metric.md in plain loops, and by hand."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from fmqm_addon.metric.features import (
     similarity_of_units,
     unit_cosine,
 )
+from fmqm_addon.metric.geometry import Floats, Ints
 from fmqm_addon.metric.settings import Settings
-from fmqm_addon.metric.spatial import Floats, Ints
 
 from .oracles import (
     features_by_loop,

@@ -12,7 +12,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fmqm_addon.metric import fields
-from fmqm_addon.metric.color import PlainColor
 from fmqm_addon.metric.fields import (
     Fields,
     _coarse_to_fine,
@@ -21,8 +20,9 @@ from fmqm_addon.metric.fields import (
     count_crossings_of_all,
     evaluate_fields,
 )
-from fmqm_addon.metric.spatial import Floats, Ints, morton_order
+from fmqm_addon.metric.geometry import Floats, Ints, morton_order
 from fmqm_addon.metric.surface import MeshArrays, Surface, prepare_surface
+from fmqm_addon.metric.texture import PlainColor
 
 from .meshes import TETRAHEDRON, cube, grid, icosahedron, materials, sphere, surface, texture
 from .oracles import NaiveQuery, exact_distance, texture_color, winding_number

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from fmqm_addon.metric.spatial import Floats, closest_on_triangles, cross, dot, morton_order
+from fmqm_addon.metric.geometry import Floats, closest_on_triangles, cross, dot, morton_order
 
 from .oracles import NaiveQuery, exact_distance, squared_distances
 

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fmqm_addon.metric.geometry import Floats, Ints
 from fmqm_addon.metric.patches import (
     PatchMesh,
     build_patch_mesh,
@@ -19,7 +20,6 @@ from fmqm_addon.metric.patches import (
     split_edges,
 )
 from fmqm_addon.metric.settings import Settings
-from fmqm_addon.metric.spatial import Floats, Ints
 from fmqm_addon.metric.surface import finish, triangle_areas, triangle_normals
 
 from .meshes import TETRAHEDRON, TRIANGLE, cube, grid, icosahedron, sphere, surface

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""METRIC "Preparing the two surfaces": welding, leaving out, the frame, colors."""
+"""The two surfaces (docs/metric.md): welding, leaving out, the frame, colors."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fmqm_addon.metric import surface as surface_module
-from fmqm_addon.metric.color import PlainColor, Texture
 from fmqm_addon.metric.errors import FMQMError, MeshError
-from fmqm_addon.metric.spatial import Floats, Ints
+from fmqm_addon.metric.geometry import Floats, Ints
 from fmqm_addon.metric.surface import MeshArrays, prepare_surface, triangle_areas, triangle_normals, weld
+from fmqm_addon.metric.texture import PlainColor, Texture
 
 from .meshes import TETRAHEDRON, TRIANGLE, cube, materials, mesh_arrays, moved, surface
 from .oracles import NaiveQuery, first_of_each, heron, weld_with_dict

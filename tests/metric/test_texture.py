@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Texture lookup pixel by pixel, and color spaces by hand."""
+"""Texture lookup pixel by pixel."""
 
 from __future__ import annotations
 
@@ -10,31 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fmqm_addon.metric.color import (
-    Arithmetic,
-    Constant,
-    Encoded,
-    Extension,
-    Grey,
-    Interpolation,
-    Light,
-    Mix,
-    Opacity,
-    Operation,
-    Placement,
-    PlainColor,
-    PlainLight,
-    Scaled,
-    Texture,
-    Tiles,
-    VertexColor,
-    Weighted,
-    channel_weights,
-    channels,
-    decode_srgb,
-    encode_srgb,
-    srgb_to_lab,
-)
+from fmqm_addon.metric.texture import Extension, Interpolation, Placement, PlainColor, Texture
 
 from .oracles import texture_color
 
@@ -199,118 +175,5 @@ def test_folded_coordinates_show_what_the_extension_shows(x: float) -> None:
         assert folded.lookup(uv).tolist() == replace(image, extension=extension).lookup(uv).tolist()
 
 
-def test_tiles() -> None:
-    """Each place shows its own tile, between -1 and 0 the first; others magenta."""
-    tiles = tuple(((column, 0), Texture(np.full((1, 1, 3), 100 + column, np.uint8))) for column in (0, 1))
-    uv = np.array([[0.5, 0.5], [1.5, 0.2], [-0.5, 0.5], [2.5, 0.5], [0.5, 1.5]])
-    assert np.round(Encoded(Tiles(tiles)).lookup(uv) * 255).tolist() == [
-        [100] * 3, [101] * 3, [100] * 3, [255, 0, 255], [255, 0, 255],
-    ]  # fmt: skip
-    assert Tiles(tiles).alpha_at(uv).tolist() == [1] * 5
-
-
-VALUES = np.array([[0.2, 0.4, 0.6, 0.5], [1.5, 0.0, 1.0, 0.25]])
-
-
-@pytest.mark.parametrize(
-    ("light", "wanted"),
-    [
-        (VertexColor(0), VALUES[:, :3]),
-        (Mix(VertexColor(0), PlainLight((1, 0, 0)), 0.25), [[0.4, 0.3, 0.45], [1.375, 0, 0.75]]),
-        (Mix(VertexColor(0), PlainLight((1, 0, 2)), 1, multiply=True), [[0.2, 0, 1.2], [1.5, 0, 2]]),
-        (Mix(VertexColor(0), PlainLight((1, 0, 2)), 0.5, multiply=True), [[0.2, 0.2, 0.9], [1.5, 0, 1.5]]),
-        (Mix(VertexColor(0), PlainLight((1, 0, 2)), 1, multiply=True, clamp=True), [[0.2, 0, 1], [1, 0, 1]]),
-        (Scaled(VertexColor(0), (2, 1, 0), (0, 0.1, 0.3)), [[0.4, 0.5, 0.3], [3, 0.1, 0.3]]),
-        (Grey(Weighted(VertexColor(0), (0, 0.5, 1))), [[0.8] * 3, [1.0] * 3]),
-        (Grey(VertexColor(0)), [[0.5] * 3, [0.25] * 3]),
-    ],
-)
-def test_lights_by_hand(light: Light, wanted: list[list[float]]) -> None:
-    np.testing.assert_allclose(light.light_at(VALUES), wanted, atol=1e-12)
-    np.testing.assert_allclose(Encoded(light).lookup(VALUES), encode_srgb(np.array(wanted)), atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("operation", "second", "wanted"),
-    [
-        ("add", 0.75, [1.25, 1.0]),
-        ("subtract", 0.75, [-0.25, -0.5]),
-        ("multiply", 2.0, [1.0, 0.5]),
-        ("less", 0.5, [0.0, 1.0]),
-        ("greater", 0.25, [1.0, 0.0]),
-        ("round", 9.0, [1.0, 0.0]),
-        ("minimum", 0.3, [0.3, 0.25]),
-        ("maximum", 0.3, [0.5, 0.3]),
-    ],
-)
-def test_arithmetic_by_hand(operation: Operation, second: float, wanted: list[float]) -> None:
-    value = Arithmetic(operation, VertexColor(0), Constant(second))
-    np.testing.assert_allclose(value.value_at(VALUES), wanted)
-    clipped = np.clip(wanted, 0, 1)
-    np.testing.assert_allclose(replace(value, clamp=True).value_at(VALUES), clipped)
-    np.testing.assert_allclose(Opacity(value).opacity(VALUES), clipped)
-
-
 def test_plain_color() -> None:
     assert PlainColor((0.1, 0.2, 0.3)).lookup(np.zeros((4, 2))).tolist() == [[0.1, 0.2, 0.3]] * 4
-
-
-@pytest.mark.parametrize(
-    ("linear", "encoded"),
-    [(0, 0), (1, 1), (0.0031308, 0.04045), (0.214041, 0.5), (0.5, 0.735357), (0.001, 0.01292), (-3, 0), (9, 1)],
-)
-def test_srgb_encoding_by_hand(linear: float, encoded: float) -> None:
-    assert encode_srgb(np.array([linear]))[0] == pytest.approx(encoded, abs=1e-5)
-    if 0 <= linear <= 1:
-        assert decode_srgb(np.array([encoded]))[0] == pytest.approx(linear, abs=1e-5)
-
-
-@given(st.floats(0, 1))
-def test_srgb_goes_back_and_forth(x: float) -> None:
-    assert decode_srgb(encode_srgb(np.array([x])))[0] == pytest.approx(x, abs=2e-7)
-
-
-@pytest.mark.parametrize(
-    ("rgb", "lab"),
-    [
-        ((1, 1, 1), (100, 0, 0)),
-        ((0, 0, 0), (0, 0, 0)),
-        ((0.5, 0.5, 0.5), (53.39, 0, 0)),
-        ((1, 0, 0), (53.24, 80.09, 67.20)),
-        ((0, 1, 0), (87.73, -86.18, 83.18)),
-        ((0, 0, 1), (32.30, 79.19, -107.86)),
-        ((1, 1, 0), (97.14, -21.55, 94.48)),
-        ((0.02, 0.02, 0.02), (1.40, 0, 0)),  # the straight part of f: 903.3 Y
-    ],
-)
-def test_lab_by_hand(rgb: tuple[float, ...], lab: tuple[float, ...]) -> None:
-    np.testing.assert_allclose(srgb_to_lab(np.array([rgb], float))[0] * 100, lab, atol=0.02)
-
-
-def test_channels_are_the_saved_values() -> None:
-    """RGB: the float32 NCF, no more digits; Lab: made of it and rounded alike."""
-    ncf = np.random.default_rng(0).random((50, 3)).astype(np.float32)
-    rgb, lab = channels(ncf, "rgb"), channels(ncf, "lab")
-    assert rgb.dtype == lab.dtype == np.float64
-    assert np.array_equal(rgb.astype(np.float32), ncf)
-    assert np.array_equal(lab, lab.astype(np.float32))
-    np.testing.assert_allclose(lab, srgb_to_lab(ncf.astype(np.float64)), atol=1e-6)
-
-
-def test_channel_weights() -> None:
-    assert channel_weights("lab").tolist() == [6, 1, 1]
-    assert len(set(channel_weights("rgb").tolist())) == 1
-
-
-def test_what_overflows_is_a_color_all_the_same() -> None:
-    """Infinite times nothing is no number."""
-
-    class Endless:
-        def light_at(self, values: np.ndarray) -> np.ndarray:
-            return np.full((len(values), 3), [np.nan, np.inf, -np.inf])
-
-        def value_at(self, values: np.ndarray) -> np.ndarray:
-            return np.full(len(values), np.nan)
-
-    assert Encoded(Endless()).lookup(np.zeros((2, 0))) == pytest.approx(np.array([[0, 1, 0]] * 2))
-    assert Opacity(Endless()).opacity(np.zeros((2, 0))).tolist() == [0, 0]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...metric.errors import MeshError
-from ...metric.spatial import Floats, Ints, dot
+from ...metric.geometry import Floats, Ints, dot
 from ...metric.surface import triangle_areas
 
 LARGEST = 8192  # pixels a side

@@ -13,10 +13,12 @@ import numpy as np
 from idprop.types import IDPropertyArray
 from numpy.typing import NDArray
 
-from ...metric.color import ImageAlpha, Material, Opacity, Texture, encode_srgb
+from ...metric.colorspace import encode_srgb
 from ...metric.errors import MeshError
-from ...metric.spatial import Floats
+from ...metric.geometry import Floats
 from ...metric.surface import triangle_areas
+from ...metric.texture import Material, Texture
+from ..materials.expressions import ImageAlpha, Opacity
 from ..materials.types import Layer, Look, Unread
 from .atlas import LARGEST, Layout, new_layout, own_layout
 from .emission import Shine, is_opaque, shining

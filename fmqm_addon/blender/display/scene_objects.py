@@ -14,8 +14,8 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
-from ...metric.color import decode_srgb
-from ...metric.spatial import Floats, Ints
+from ...metric.colorspace import decode_srgb
+from ...metric.geometry import Floats, Ints
 
 TAG = "fmqm"  # custom property of every data-block of ours: what it is for
 COLLECTION = "FMQM"

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
-from ...metric.spatial import Floats
+from ...metric.geometry import Floats
 
 # On a Screen, which undo does not touch and which is saved with the views: what we changed, and from what.
 _BEFORE = "fmqm_shading"

@@ -16,8 +16,9 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...metric.color import ImageFacts, Texture, encode_srgb
+from ...metric.colorspace import encode_srgb
 from ...metric.errors import FileError, ImageSizeError, MeshError
+from ...metric.texture import ImageFacts, Texture
 from .image_headers import DEFAULT_LIMITS, Header, Limits, file_header, read_header
 
 LINEAR_SPACES = frozenset({"Non-Color", "Linear Rec.709", "scene_linear"})

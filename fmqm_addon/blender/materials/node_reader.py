@@ -14,36 +14,38 @@ import bpy
 import numpy as np
 from mathutils import Euler, Matrix
 
-from ...metric.color import (
+from ...metric.colorspace import encode_srgb
+from ...metric.errors import ImageMissingError
+from ...metric.geometry import Floats
+from ...metric.texture import (
     MISSING,
     Alpha,
-    Arithmetic,
     Color,
+    Extension,
+    Fold,
+    Interpolation,
+    Placement,
+    PlainColor,
+    Texture,
+    Tiles,
+)
+from .cycles_alpha import merged, used_alphas
+from .expressions import (
+    Arithmetic,
     Constant,
     Encoded,
-    Extension,
-    Floats,
-    Fold,
     Grey,
     ImageAlpha,
-    Interpolation,
     Light,
     Mix,
     Opacity,
     Operation,
-    Placement,
-    PlainColor,
     PlainLight,
     Scaled,
-    Texture,
-    Tiles,
     Value,
     VertexColor,
     Weighted,
-    encode_srgb,
 )
-from ...metric.errors import ImageMissingError
-from .cycles_alpha import merged, used_alphas
 from .images import (
     BRIGHTEST,
     Pixels,

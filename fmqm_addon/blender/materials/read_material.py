@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import bpy
 
-from ...metric.color import ImageFacts, Material
 from ...metric.errors import MeshError
+from ...metric.texture import ImageFacts, Material
 from ..baking.emission import color_of
 from .images import TextureCache, black_warnings
 from .node_graph import NotReadError, node_count, outputs, surface_of, upstream, uses_nodes

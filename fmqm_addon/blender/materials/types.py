@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from ...metric.color import ImageFacts, Material, Texture
+from ...metric.texture import ImageFacts, Material, Texture
 from .image_headers import DEFAULT_LIMITS, Limits
 
 MAX_BAKE = 16384  # pixels a side

@@ -10,7 +10,7 @@ import numpy as np
 from mathutils.bvhtree import BVHTree
 
 from ...metric.errors import MeshError
-from ...metric.spatial import Floats, Ints
+from ...metric.geometry import Floats, Ints
 
 
 class BVHQuery:

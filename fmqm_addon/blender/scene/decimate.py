@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from ...comparison.measurement import Measurement
 from ...metric.errors import FMQMError, MeshError, SettingsError
-from ...metric.score import Progress, Stepper, Work, as_part
 from ...metric.settings import FAST_SCORED_PATCHES, Settings
+from ...metric.stepper import Progress, Stepper, Work, as_part
 from ...metric.surface import MeshArrays, weld
 from .target import placed
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ...metric.spatial import Floats
+from ...metric.geometry import Floats
 from .members import hidden_when_instanced, instanced, metaball_family
 
 

@@ -13,7 +13,8 @@ from ...comparison.measurement import Comparison
 from ...comparison.pair import Answer, Question, answering, measurement_of
 from ...comparison.trust import Trust
 from ...metric.errors import FMQMError
-from ...metric.score import Progress, Scores, Stepper, Work, as_part
+from ...metric.evaluation import Scores
+from ...metric.stepper import Progress, Stepper, Work, as_part
 from ..materials.images import TextureCache
 from ..materials.types import Reading
 from .target import Target, bakes, fingerprint, take

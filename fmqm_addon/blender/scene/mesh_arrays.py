@@ -15,11 +15,12 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
-from ...metric.color import Encoded, Material, VertexColor
 from ...metric.errors import MeshError, one_line
-from ...metric.spatial import Floats
+from ...metric.geometry import Floats
 from ...metric.surface import MeshArrays, join_meshes
+from ...metric.texture import Material
 from ..baking.bake import Baked, bake_slots, copy_properties
+from ..materials.expressions import Encoded, VertexColor
 from ..materials.images import DARKEST, TextureCache
 from ..materials.read_material import plain_look, read_look
 from ..materials.types import Layer, Look, Reading, Unread

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ...comparison.alignment import Placed
 from ...metric.errors import MeshError
-from ...metric.spatial import Floats
+from ...metric.geometry import Floats
 from ..materials.images import TextureCache, image_paths
 from ..materials.types import Reading
 from .evaluated import evaluated

@@ -16,7 +16,7 @@ from urllib.parse import quote
 
 import numpy as np
 
-from ...metric.spatial import Floats
+from ...metric.geometry import Floats
 from ..atomic_files import write_parts
 from ..junit import below
 from ..records import SHOWN

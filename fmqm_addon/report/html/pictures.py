@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...metric.color import Texture
 from ...metric.errors import FileError, OutputError
-from ...metric.score import Result
+from ...metric.evaluation import Result
 from ...metric.surface import Surface
+from ...metric.texture import Texture
 from ..atomic_files import check_writable, replaced
 from ..render import (
     Camera,

@@ -7,8 +7,8 @@ from functools import cache
 
 import numpy as np
 
-from ...metric.color import srgb_to_lab
-from ...metric.spatial import Floats, Ints
+from ...metric.colorspace import srgb_to_lab
+from ...metric.geometry import Floats, Ints
 
 NO_PATCH = (0.62, 0.63, 0.65)  # of a place that no scored patch covers
 

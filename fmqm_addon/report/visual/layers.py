@@ -9,9 +9,9 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...metric.evaluation import COLUMNS, Result
 from ...metric.fields import Fields
-from ...metric.score import COLUMNS, Result
-from ...metric.spatial import Floats, dot
+from ...metric.geometry import Floats, dot
 from .colormap import GREY_DARK, GREY_LIGHT, SKY, VERMILION, number_colors, score_colors, signed_colors
 
 # How values become colors.

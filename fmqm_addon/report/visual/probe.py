@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...metric.evaluation import COLUMNS, Result
 from ...metric.features import find_pairs, unit_cosine
 from ...metric.fields import Fields, evaluate_fields
-from ...metric.score import COLUMNS, Result
-from ...metric.spatial import Floats, Ints, dot, morton_order
+from ...metric.geometry import Floats, Ints, dot, morton_order
 from ...metric.surface import Surface, triangle_areas, triangle_normals
 from .layers import LAYERS, NUMBER
 
