@@ -56,7 +56,8 @@ def measure(
     Returns:
         One outcome per distorted asset, in their order; `outcome.scores` are Scores, a named tuple in the order
         of COLUMNS, or None with the reason in `outcome.error`. `outcome.comparison.result` is a Result of
-        metric.evaluation with patches, samples and fields, `outcome.trust` a comparison.trust.Trust: how far to believe the scores.
+        metric.evaluation with patches, samples and fields, `outcome.trust` a comparison.trust.Trust: how far to
+        believe the scores.
 
     Raises:
         TypeError: an asset is no object and no collection.
