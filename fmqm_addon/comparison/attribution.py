@@ -88,8 +88,11 @@ def _attribute(
     yield Progress("prepare", 0.0)
     theirs, own = _counterparts(distorted, reference), _counterparts(reference, distorted)
     how: How = "nearest points"
-    alike = _unwrapped_alike(reference, distorted) or _lie_alike(measurement.reference, compared)
-    if theirs is not None and own is not None and alike:
+    if (
+        theirs is not None
+        and own is not None
+        and (_unwrapped_alike(reference, distorted) or _lie_alike(measurement.reference, compared))
+    ):
         how = "materials"
         painted = replace(distorted, materials=theirs), replace(reference, materials=own)
     else:

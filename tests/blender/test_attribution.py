@@ -22,6 +22,7 @@ from fmqm_addon.comparison.measurement import Measurement
 from fmqm_addon.comparison.pair import Question
 from fmqm_addon.metric.settings import PRESETS, Settings
 from fmqm_addon.metric.surface import MeshArrays
+from fmqm_addon.metric.texture import Material, PlainColor
 from fmqm_addon.ui import inputs, panels
 from fmqm_addon.ui.properties import row_attribution
 
@@ -86,6 +87,16 @@ def test_a_mesh_unwrapped_anew_is_painted_from_nearest_points(torus: dict[str, M
     found = attributed(torus["reference"], shifted)
     assert found.how == "nearest points"
     assert found.geometry_loss < 0.01 and found.texture_loss > 0.1
+
+
+def test_a_texture_is_compared_with_a_mesh_that_has_none(torus: dict[str, MeshArrays]) -> None:
+    """The other one's material reads no texture coordinates, and its corners hold none."""
+    whole = torus["geometry"]
+    grey = (Material("grey", PlainColor((0.5, 0.5, 0.5))),)
+    bare = replace(whole, corners=whole.corners[:, :, :0], materials=grey, material=np.zeros_like(whole.material))
+    for reference, distorted in ((bare, torus["reference"]), (torus["reference"], bare)):
+        found = attributed(reference, distorted)
+        assert found.how == "nearest points" and found.texture_loss > found.geometry_loss > 0
 
 
 def test_materials_are_told_by_name_then_by_place(torus: dict[str, MeshArrays]) -> None:
