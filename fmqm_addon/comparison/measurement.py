@@ -11,6 +11,7 @@ import numpy as np
 from ..blender.scene.bvh import BVHQuery
 from ..metric.errors import MeshError
 from ..metric.evaluation import Evaluation, Result, Scores
+from ..metric.geometry import Floats
 from ..metric.settings import Settings
 from ..metric.stepper import Progress, Stepper, Work, as_part, as_work
 from ..metric.surface import MeshArrays, Surface, preparing_surface
@@ -24,12 +25,18 @@ class Comparison:
     Attributes:
         scores: means over the seeds.
         stderr: standard errors of these means; None for one seed.
+        perceived: (5,) float64 in the order of metric.perceived.PERCEIVED_COLUMNS, mean over the seeds.
+        perceived_p10: 10th percentile of perceived over the patches, mean over the seeds.
+        perceived_stderr: (6,) standard errors of these five and of perceived_p10; None for one seed.
         result: of the first seed, with patches and fields. distorted: the prepared surface.
         trust: what is known about the scores, from the first seed.
     """
 
     scores: Scores
     stderr: Scores | None
+    perceived: Floats
+    perceived_p10: float
+    perceived_stderr: Floats | None
     result: Result
     distorted: Surface
     trust: Trust
@@ -88,18 +95,25 @@ class Measurement:
             self._facts = yield from as_work(surface_facts(self.reference), "features", 0.92, 0.96)
         assessed = assessing(self.reference, surface, results[0], self._facts)
         trust = yield from as_work(assessed, "features", 0.96, 1.0)
-        stderr = None
-        if len(results) > 1:
-            spread = np.std([result.scores for result in results], axis=0, ddof=1)
-            stderr = Scores(*(spread / np.sqrt(len(results))).tolist())
-        pair = (*known, *trust.pair, _error_fact(stderr, len(results)))
-        return Comparison(_mean_scores(results), stderr, results[0], surface, replace(trust, pair=pair))
+        scores, stderr = _mean([result.scores for result in results])
+        perceived, perceived_stderr = _mean([(*result.perceived, result.perceived_p10) for result in results])
+        errors = None if stderr is None else Scores(*stderr.tolist())
+        return Comparison(
+            scores=Scores(*scores.tolist()),
+            stderr=errors,
+            perceived=perceived[:-1],
+            perceived_p10=float(perceived[-1]),
+            perceived_stderr=perceived_stderr,
+            result=results[0],
+            distorted=surface,
+            trust=replace(trust, pair=(*known, *trust.pair, _error_fact(errors, len(results)))),
+        )
 
     def _reverse(self, distorted: MeshArrays) -> Work[Scores]:
         other = Measurement(distorted, self._settings, self._repeats)
         yield from as_part(other.prepare(), 0.0, 0.5)
         _, results = yield from other._results(self._mesh, 0.5, 0.5)
-        return _mean_scores(results)
+        return Scores(*_mean([result.scores for result in results])[0].tolist())
 
     def _results(self, distorted: MeshArrays, first: float, share: float) -> Work[tuple[Surface, list[Result]]]:
         """The prepared mesh and its result for each seed; progress goes from first on by the share."""
@@ -115,15 +129,17 @@ class Measurement:
                 results.append((yield from as_part(comparing, first + 0.05 * share + each * repeat, each)))
             except MeshError as error:
                 raise MeshError(f"{distorted.name}: {error}") from error
-        if not all(np.isfinite(result.scores).all() for result in results):
+        if not all(np.isfinite([*result.scores, *result.perceived]).all() for result in results):
             raise MeshError(
                 f"{distorted.name}: the scores are not finite; its coordinates are beyond what can be measured"
             )
         return surface, results
 
 
-def _mean_scores(results: Sequence[Result]) -> Scores:
-    return Scores(*np.mean([result.scores for result in results], axis=0).tolist())
+def _mean(rows: Sequence[Sequence[float]]) -> tuple[Floats, Floats | None]:
+    """The mean over the seeds, and its standard error; None for one seed."""
+    stderr = np.std(rows, axis=0, ddof=1) / np.sqrt(len(rows)) if len(rows) > 1 else None
+    return np.mean(rows, axis=0), stderr
 
 
 def _error_fact(stderr: Scores | None, repeats: int) -> Fact:

@@ -10,17 +10,18 @@ fmqm() does this at once. One preparation serves any number of comparisons, all 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from .colorspace import channel_weights, channels
 from .errors import MeshError
-from .features import FieldValues, features_of_patches, pool_features
+from .features import FieldValues, features_of_patches, pairs_of_patches, pool_features
 from .fields import Fields, evaluate_fields
 from .geometry import Floats, Ints, morton_order
 from .patches import Patch, PatchMesh, build_patch_mesh, choose_centers, grow_patches
+from .perceived import LOW_PERCENTILE, PERCEIVED_COLUMNS, RADIUS, perceived_of_patches
 from .sampling import Samples, draw_samples, join_samples
 from .settings import Settings
 from .stepper import Progress, Stepper, Work, as_work
@@ -49,6 +50,9 @@ class Result:
     Attributes:
         scores: means over the patches.
         patch_scores: (P, 5) float64, in the order of COLUMNS.
+        perceived: (5,) float64 means over the patches, in the order of perceived.PERCEIVED_COLUMNS.
+        perceived_p10: 10th percentile of perceived over the patches, linear between ranks.
+        patch_perceived: (P, 5) float64, in the same order.
         patch_mesh: the reference as the patches see it; their faces are its triangles.
         patches: the P patches, on patch_mesh. patch_centers: (P, 3) metric's frame.
         samples: N sample points. ref, dist: the fields of both surfaces there; metric's frame.
@@ -59,6 +63,9 @@ class Result:
     settings: Settings
     scores: Scores
     patch_scores: Floats
+    perceived: Floats
+    perceived_p10: float
+    patch_perceived: Floats
     patch_mesh: PatchMesh
     patches: tuple[Patch, ...]
     patch_centers: Floats
@@ -123,9 +130,10 @@ class Evaluation:
 
         warnings = list(self.reference.warnings)
         if mesh.was_split:
+            before, after = len(self.reference.triangles), len(mesh.triangles)
             warnings.append(
-                f"{self.reference.name}: triangles larger than a patch; their edges were split for the "
-                f"patches ({len(self.reference.triangles)} to {len(mesh.triangles)} triangles, same surface)"
+                f"{self.reference.name}: {len(self.reference.vertices)} vertices are too few for {settings.patches} "
+                f"patches; edges were split for them ({before} to {after} triangles, same surface)"
             )
         reach = np.abs(samples.offset)  # a sample is this near to the face it was drawn on
         fields = evaluate_fields(self.reference, samples.positions, order, reach)
@@ -140,26 +148,32 @@ class Evaluation:
         channels_r, channels_d = (channels(field.ncf, settings.color_space) for field in (prepared.ref, dist))
         diagonals = np.array([patch.diagonal for patch in prepared.patches])
         features = np.empty((len(prepared.patches), 4))
+        perceived = np.empty((len(prepared.patches), len(PERCEIVED_COLUMNS)))
         for first in range(0, len(features), _PATCHES_AT_ONCE):
             group = slice(first, first + _PATCHES_AT_ONCE)
             start = samples.start[first : first + _PATCHES_AT_ONCE + 1]
             here = slice(start[0], start[-1])
+            start = start - start[0]
             diagonal = np.repeat(diagonals[group], np.diff(start))  # lengths are in patch diagonals from here on
-            features[group] = features_of_patches(
-                samples.positions[here] / diagonal[:, None],
-                start - start[0],
-                _in_diagonals(prepared.ref, channels_r, here, diagonal),
-                _in_diagonals(dist, channels_d, here, diagonal),
-                np.flatnonzero(samples.unit[here]),
-                weights,
-                settings,
-            )
+            positions, units = samples.positions[here] / diagonal[:, None], np.flatnonzero(samples.unit[here])
+            ref, other = _in_diagonals(prepared.ref, here, diagonal), _in_diagonals(dist, here, diagonal)
+            near = pairs_of_patches(positions, start, units, RADIUS, itself=True)
+            perceived[group] = perceived_of_patches(positions, start, ref, other, units, near)
+            if settings.radius == RADIUS:
+                pairs = near.pick(near.distance > 0)
+            else:
+                pairs = pairs_of_patches(positions, start, units, settings.radius)
+            ref, other = replace(ref, channels=channels_r[here]), replace(other, channels=channels_d[here])
+            features[group] = features_of_patches(positions, start, ref, other, units, pairs, weights, settings)
             yield Progress("features", 0.8 + 0.2 * min(first + _PATCHES_AT_ONCE, len(features)) / len(features))
         patch_scores = np.column_stack([features, pool_features(features, settings.pooling)])
         return Result(
             settings=settings,
             scores=Scores(*patch_scores.mean(axis=0).tolist()),
             patch_scores=patch_scores,
+            perceived=perceived.mean(axis=0),
+            perceived_p10=float(np.percentile(perceived[:, -1], LOW_PERCENTILE)),
+            patch_perceived=perceived,
             patch_mesh=prepared.patch_mesh,
             patches=prepared.patches,
             patch_centers=prepared.patch_centers,
@@ -201,5 +215,6 @@ def fmqm(reference: MeshArrays, distorted: MeshArrays, settings: Settings, build
     return evaluation.compare(prepare_surface(distorted, build_query, surface.frame)).run().scores
 
 
-def _in_diagonals(fields: Fields, values: Floats, here: slice, diagonal: Floats) -> FieldValues:
-    return FieldValues(fields.nearest[here] / diagonal[:, None], fields.sdf[here] / diagonal, values[here])
+def _in_diagonals(fields: Fields, here: slice, diagonal: Floats) -> FieldValues:
+    ncf = fields.ncf[here].astype(np.float64)
+    return FieldValues(fields.nearest[here] / diagonal[:, None], fields.sdf[here] / diagonal, ncf)

@@ -38,6 +38,7 @@ def features_of_patches(
     ref: FieldValues,
     dist: FieldValues,
     units: Ints,
+    pairs: Pairs,
     weights: Floats,
     settings: Settings,
 ) -> Floats:
@@ -49,15 +50,15 @@ def features_of_patches(
         positions: (n, 3) samples, patch after patch, each in its own patch's diagonals.
         start: (G + 1,) patch k is start[k] : start[k + 1].
         units: ascending indices of the drawn color units. weights: (C,) of the channels.
+        pairs: pairs_of_patches within settings.radius.
     """
     to_ref, to_dist = ref.nearest - positions, dist.nearest - positions
-    pairs = _pairs_of_patches(positions, start, units, settings.radius)
     along = unit_cosine(pairs, units, to_ref)
     normal = similarity_of_units(pairs.pick(along > settings.normal_threshold), units, ref, dist)
     tangent = similarity_of_units(pairs.pick(along < settings.tangent_threshold), units, ref, dist)
 
     if settings.gradient_radius != settings.radius:
-        pairs = _pairs_of_patches(positions, start, units, settings.gradient_radius)
+        pairs = pairs_of_patches(positions, start, units, settings.gradient_radius)
         along = unit_cosine(pairs, units, to_ref)
     gradient_r = color_gradient(pairs.pick(along < settings.tangent_threshold), units, ref.channels)
     along = unit_cosine(pairs, units, to_dist)
@@ -105,7 +106,7 @@ class Pairs:
     """Pairs of a color unit p and another sample p' of its patch, unit after unit, p' ascending.
 
     Attributes:
-        row: (m,) which unit. other: (m,) p'. offset: (m, 3) p' - p. distance: (m,) |pp'|, above 0.
+        row: (m,) which unit. other: (m,) p'. offset: (m, 3) p' - p. distance: (m,) |pp'|.
     """
 
     row: Ints
@@ -123,10 +124,11 @@ class Pairs:
         )
 
 
-def find_pairs(positions: Floats, units: Ints, radius: float) -> Pairs:
+def find_pairs(positions: Floats, units: Ints, radius: float, itself: bool = False) -> Pairs:
     """All pairs with 0 < |pp'| < radius; a rough search in float32, with room for its rounding, comes first.
 
-    The rough squared distances are inner products: p.p - 2 p.p' + p'.p'.
+    With itself, p and what lies at its very place count too. The rough squared distances are inner products:
+    p.p - 2 p.p' + p'.p'.
     """
     x, y, z = (positions - positions.mean(axis=0)).astype(np.float32).T
     squares, ones = x * x + y * y + z * z, np.ones(len(positions), np.float32)
@@ -135,14 +137,15 @@ def find_pairs(positions: Floats, units: Ints, radius: float) -> Pairs:
     row, other = np.divmod(np.flatnonzero(squared < radius * radius + ROUGH * max(1.0, squares.max())), len(positions))
     offset = positions.take(other, axis=0) - positions.take(units.take(row), axis=0)
     distance = np.sqrt(dot(offset, offset))
-    return Pairs(row, other, offset, distance).pick((distance > 0) & (distance < radius))
+    inside = distance < radius
+    return Pairs(row, other, offset, distance).pick(inside if itself else inside & (distance > 0))
 
 
-def _pairs_of_patches(positions: Floats, start: Ints, units: Ints, radius: float) -> Pairs:
-    """The pairs within each patch, indexed among all samples and all units."""
+def pairs_of_patches(positions: Floats, start: Ints, units: Ints, radius: float, itself: bool = False) -> Pairs:
+    """The pairs within each patch, as find_pairs has them, indexed among all samples and all units."""
     parts = []
     for here, drawn in zip(_slices(start), _slices(np.searchsorted(units, start)), strict=True):
-        part = find_pairs(positions[here], units[drawn] - here.start, radius)
+        part = find_pairs(positions[here], units[drawn] - here.start, radius, itself)
         parts.append((part.row + drawn.start, part.other + here.start, part.offset, part.distance))
     return Pairs(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 

@@ -22,7 +22,7 @@ _FPS_BLOCK = 256  # vertices that share a bounding box in farthest point samplin
 
 @dataclass(frozen=True)
 class PatchMesh:
-    """The reference as patches see it: same surface, triangles small enough for patches to grow evenly.
+    """The reference as patches see it: the same surface, with vertices enough to be their centres.
 
     Attributes:
         vertices: (V, 3), metric's frame. triangles: (T, 3) into vertices. areas: (T,).
@@ -61,20 +61,21 @@ class Patch:
 
 
 def build_patch_mesh(surface: Surface, n_patches: int) -> Generator[float, None, PatchMesh]:
-    """Triangles of the reference, with the edges of large ones split where one patch would be too coarse.
+    """Triangles of the reference; the edges of large ones are split where there are fewer vertices than patches.
 
-    If any triangle is larger than S_global / n_patches, the edges of all above S_global / (4 n_patches)
-    are halved until none is; otherwise nothing changes. Yields the share done, about.
+    Then the edges of all triangles above S_global / (4 n_patches) are halved until none is; otherwise nothing
+    changes, however large a triangle is: centres are vertices, and those stand where a mesh has its detail.
+    Yields the share done, about.
     """
     vertices, triangles = surface.vertices, surface.triangles
     parent = np.arange(len(triangles))
     areas = triangle_areas(vertices, triangles)
     yield 0.2
-    target = float(areas.sum()) / n_patches
-    was_split = bool(areas.max() > target * (1 + AREA_ROUNDING))
-    if was_split:
-        limit = target / SPLIT_BELOW * (1 + AREA_ROUNDING)
+    was_split = False
+    if len(vertices) < n_patches:
+        limit = float(areas.sum()) / n_patches / SPLIT_BELOW * (1 + AREA_ROUNDING)
         while (areas > limit).any():
+            was_split = True
             vertices, triangles, cut_from = split_edges(vertices, triangles, areas > limit)
             parent = parent[cut_from]
             yield 0.5

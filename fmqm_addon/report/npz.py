@@ -17,7 +17,13 @@ def save_fields(path: str, result: Result) -> None:
     position, ref_nearest, dist_nearest (N, 3) f8, the reference's world frame; ref_sdf, dist_sdf (N,) f8,
     scene units, negative inside; ref_ncf, dist_ncf (N, 3) f4 in [0, 1]; patch (N,) i4, row of the P
     arrays; unit (N,) bool, the drawn color units; patch_center (P, 3), patch_diagonal, patch_area (P,)
-    f8; patch_scores (P, 5) f8: geoSSIM, geoGraSSIM, colorSSIM, colorGraSSIM, FMQM; settings, a JSON text.
+    f8; patch_scores (P, 5) f8: geoSSIM, geoGraSSIM, colorSSIM, colorGraSSIM, FMQM; patch_perceived (P, 5)
+    f8: shape, facing, color, detail, perceived; settings, a JSON text.
+
+    Both tables follow from the other arrays. Samples are sorted by patch, and in each of them by nothing;
+    a patch's L is its patch_diagonal, in the units of position. perceived takes ref_sdf with its sign and
+    dist_sdf without, both nearest points, the NCFs as they are saved, and of each unit all samples of its
+    patch within 0.125 L.
 
     Raises:
         FileError: the file cannot be written.
@@ -39,5 +45,6 @@ def save_fields(path: str, result: Result) -> None:
             patch_diagonal=np.array([patch.diagonal for patch in result.patches]) * frame.scale,
             patch_area=np.array([patch.area for patch in result.patches]) * frame.scale**2,
             patch_scores=result.patch_scores,
+            patch_perceived=result.patch_perceived,
             settings=np.array(json.dumps(result.settings.as_dict())),
         )

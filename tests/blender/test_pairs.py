@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Scores of real models: as an independent implementation's, exactly 1 against themselves, and still under moves."""
+"""Both readings of real models: as an independent implementation's, 1 against themselves, and still under moves."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ from fmqm_addon.blender.materials.images import load_texture
 from fmqm_addon.blender.materials.types import Reading
 from fmqm_addon.blender.scene.members import scene_members
 from fmqm_addon.blender.scene.mesh_arrays import mesh_arrays
-from fmqm_addon.comparison.measurement import Measurement
+from fmqm_addon.comparison.measurement import Comparison, Measurement
 from fmqm_addon.metric.errors import FileError
 from fmqm_addon.metric.evaluation import COLUMNS
+from fmqm_addon.metric.perceived import PERCEIVED_COLUMNS
 from fmqm_addon.metric.settings import PRESETS, Settings
 from fmqm_addon.metric.surface import MeshArrays
 
@@ -30,7 +31,9 @@ PAPER, FAST = (Settings(**PRESETS[name]) for name in ("paper", "fast"))
 MODELS = ("spot", "egyptian_cat", "bob", "low_poly_tree")
 PAIRED = MODELS[:2]
 DISTORTIONS = ("gn_3", "swt_3", "ds_3", "tmc_3")
-SAME_CONTENT = np.array([1e-3, 1e-3, 1e-3, 1e-2, 2e-3])  # nearest points tie at UV seams; gradients feel 1e-7
+SAME_CONTENT = np.array(
+    [1e-3, 1e-3, 1e-3, 1e-2, 2e-3, *[1e-3] * 5]
+)  # nearest points tie at UV seams; gradients feel 1e-7
 MOVED = 2e-3
 
 
@@ -41,7 +44,9 @@ def prepared(reference: MeshArrays, settings: Settings, repeats: int = 1) -> Mea
 
 
 def scores(measurement: Measurement, distorted: MeshArrays) -> np.ndarray:
-    return np.array(measurement.compare(distorted).run().scores)
+    """All ten columns: the paper's, then the perceived ones."""
+    comparison = measurement.compare(distorted).run()
+    return np.concatenate([comparison.scores, comparison.perceived])
 
 
 def model(shared_data: Path, name: str) -> Path:
@@ -53,21 +58,61 @@ def distorted(shared_data: Path, name: str, distortion: str) -> Path:
 
 
 @pytest.fixture(scope="module", params=PAIRED)
-def three_seeds(request: pytest.FixtureRequest, shared_data: Path) -> tuple[str, Measurement]:
-    return request.param, prepared(load_mesh(str(model(shared_data, request.param))), PAPER, repeats=3)
+def three_seeds(request: pytest.FixtureRequest, shared_data: Path) -> tuple[str, dict[str, Comparison]]:
+    measurement = prepared(load_mesh(str(model(shared_data, request.param))), PAPER, repeats=3)
+    return request.param, {
+        distortion: measurement.compare(load_mesh(str(distorted(shared_data, request.param, distortion)))).run()
+        for distortion in DISTORTIONS
+    }
 
 
 @pytest.mark.parametrize("distortion", DISTORTIONS)
 def test_pair_agrees_with_an_independent_implementation(
-    shared_data: Path, three_seeds: tuple[str, Measurement], distortion: str
+    shared_data: Path, three_seeds: tuple[str, dict[str, Comparison]], distortion: str
 ) -> None:
-    name, measurement = three_seeds
+    name, compared = three_seeds
     expected = json.loads((shared_data / "expected.json").read_text(encoding="utf-8"))
     assert tuple(expected["columns"]) == COLUMNS
-    wanted = expected["pairs"][f"{name}/{distortion}"]
-    mine = scores(measurement, load_mesh(str(distorted(shared_data, name, distortion))))
+    wanted, mine = expected["pairs"][f"{name}/{distortion}"], compared[distortion].scores
     print(name, distortion, *np.round(mine, 4))
     assert (np.abs(mine - wanted["mean"]) <= 2 * np.array(wanted["std"]) + 0.003).all()
+
+
+@pytest.mark.parametrize("distortion", DISTORTIONS)
+def test_perceived_agrees_with_an_independent_implementation(
+    shared_data: Path, three_seeds: tuple[str, dict[str, Comparison]], distortion: str
+) -> None:
+    name, compared = three_seeds
+    expected = json.loads((shared_data / "expected_perceived.json").read_text(encoding="utf-8"))
+    wanted, deviation = np.array([expected[f"{name}/{distortion}"][column] for column in PERCEIVED_COLUMNS]).T
+    mine = compared[distortion].perceived
+    print(name, distortion, *np.round(mine, 5))
+    assert (np.abs(mine - wanted) <= 2 * deviation + 0.001).all()
+    assert mine[-1] < 1, "below the model's own score"
+    assert compared[distortion].perceived_p10 < mine[-1]
+
+
+def test_repeats_have_the_mean_of_each_seed(three_seeds: tuple[str, dict[str, Comparison]], shared_data: Path) -> None:
+    name, compared = three_seeds
+    alone = []
+    for seed in range(3):
+        measurement = prepared(load_mesh(str(model(shared_data, name))), PAPER.with_seed(seed))
+        one = measurement.compare(load_mesh(str(distorted(shared_data, name, "gn_3")))).run()
+        assert one.perceived_stderr is None
+        alone.append([*one.perceived, one.perceived_p10])
+    mean = [*compared["gn_3"].perceived, compared["gn_3"].perceived_p10]
+    np.testing.assert_allclose(mean, np.mean(alone, axis=0), rtol=1e-12)
+    np.testing.assert_allclose(compared["gn_3"].perceived_stderr, np.std(alone, axis=0, ddof=1) / 3**0.5, rtol=1e-9)
+
+
+def test_noise_that_nobody_sees(shared_data: Path) -> None:
+    """A plain color with noise of one 8-bit step: the paper's number sees all structure lost, the perceived none."""
+    flat = shared_data / "cases" / "flat"
+    measurement = prepared(load_mesh(str(flat / "ref.obj")), PAPER)
+    mine = scores(measurement, load_mesh(str(flat / "noise1.obj")))
+    print(*np.round(mine, 4))
+    assert mine[4] < 0.5 and mine[9] >= 0.99
+    assert scores(measurement, load_mesh(str(flat / "ref.obj"))).tolist() == [1.0] * 10
 
 
 # A mesh against itself
@@ -76,7 +121,7 @@ def test_pair_agrees_with_an_independent_implementation(
 @pytest.mark.parametrize("name", MODELS)
 def test_model_against_itself_scores_exactly_1(shared_data: Path, name: str) -> None:
     first, second = (load_mesh(str(model(shared_data, name))) for _ in range(2))
-    assert scores(prepared(first, PAPER), second).tolist() == [1.0] * 5
+    assert scores(prepared(first, PAPER), second).tolist() == [1.0] * 10
 
 
 ASSETS = (
@@ -93,7 +138,7 @@ def test_real_asset_against_itself_scores_exactly_1(shared_data: Path, name: str
         if "draco" not in name or "draco" not in str(error):
             raise
         pytest.skip(f"this bpy comes without the Draco decoder: {error}")
-    assert scores(prepared(first, FAST), second).tolist() == [1.0] * 5
+    assert scores(prepared(first, FAST), second).tolist() == [1.0] * 10
 
 
 def test_quads_with_a_given_texture_score_exactly_1(shared_data: Path) -> None:
@@ -104,8 +149,8 @@ def test_quads_with_a_given_texture_score_exactly_1(shared_data: Path) -> None:
         for _ in range(2)
     ]
     measurement = prepared(quads[0], FAST)
-    assert scores(measurement, quads[1]).tolist() == [1.0] * 5
-    assert scores(measurement, load_mesh(str(model(shared_data, "spot"))))[-1] > 0.9
+    assert scores(measurement, quads[1]).tolist() == [1.0] * 10
+    assert scores(measurement, load_mesh(str(model(shared_data, "spot"))))[[4, 9]].min() > 0.9
 
 
 # The same content in another form

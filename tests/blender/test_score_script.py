@@ -202,6 +202,7 @@ def test_fields_have_the_promised_names_types_and_shapes(whole: Path) -> None:
         "unit": ("|b1", (n,)),
         "patch_center": ("<f8", (p, 3)),
         "patch_scores": ("<f8", (p, 5)),
+        "patch_perceived": ("<f8", (p, 5)),
     }
     pair = document["pairs"][0]
     assert (p, n) == (pair["patches"], pair["samples"])

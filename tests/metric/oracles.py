@@ -336,3 +336,66 @@ def features_by_loop(
         math.sqrt(np.mean(normal) * np.mean(tangent)),
         color_gradient_similarity(gradients(ref), gradients(dist), weights),
     ]
+
+
+# --- perceived quality ------------------------------------------------------------------------------------
+
+
+def alike(product: float, squares: float, constant: float) -> float:
+    """max(0, (2 a b + c) / (a^2 + b^2 + c))."""
+    return max(0.0, (2 * product + constant) / (squares + constant))
+
+
+def moments(a: Row, b: Row) -> tuple[float, float, float, float, float]:
+    """Population means, variances and covariance."""
+    n = len(a)
+    mean_a, mean_b = math.fsum(a) / n, math.fsum(b) / n
+    var_a, var_b = math.fsum((x - mean_a) ** 2 for x in a) / n, math.fsum((x - mean_b) ** 2 for x in b) / n
+    cov = math.fsum((x - mean_a) * (y - mean_b) for x, y in zip(a, b, strict=True)) / n
+    return mean_a, mean_b, var_a, var_b, cov
+
+
+def perceived_shape(r: Row, d: Row) -> float:
+    """cbrt(min(1, M S C))."""
+    mean_r, mean_d, var_r, var_d, cov = moments(r, d)
+    if var_r == 0 or var_d == 0:
+        return float(var_r == var_d and mean_r == mean_d)
+    mean = alike(mean_r * mean_d, mean_r**2 + mean_d**2, var_r + var_d)
+    spread = 2 * math.sqrt(var_r * var_d) / (var_r + var_d)
+    return math.cbrt(min(1.0, mean * spread * max(0.0, cov / math.sqrt(var_r * var_d))))
+
+
+def perceived_color(positions: Floats, colors_r: Floats, colors_d: Floats, unit: int) -> list[tuple[float, float]]:
+    """Color and detail of one unit, a channel a row."""
+    members = [k for k, p in enumerate(positions) if math.fsum((p - positions[unit]) ** 2) < 0.125**2]
+    offset = positions[members] - positions[members].mean(axis=0)
+    spread = np.array([[math.fsum(a * b) / len(members) for b in offset.T] for a in offset.T])
+
+    def slope(values: Floats) -> Floats:
+        centered = values - math.fsum(values) / len(values)
+        cov = np.array([math.fsum(axis * centered) / len(values) for axis in offset.T])
+        fitted: Floats = np.linalg.solve(spread + 1e-5 * np.eye(3), cov)
+        return fitted
+
+    rows = []
+    for r, d in zip(colors_r[members].T, colors_d[members].T, strict=True):
+        mean_r, mean_d, var_r, var_d, cov = moments(r.tolist(), d.tolist())
+        color = alike(mean_r * mean_d, mean_r**2 + mean_d**2, 0.01**2) * alike(cov, var_r + var_d, 0.03**2)
+        g, h = slope(r), slope(d)
+        rows.append((color, alike(float(g @ h), float(g @ g + h @ h), 0.2304)))
+    return rows
+
+
+def perceived_by_loop(positions: Floats, ref: FieldValues, dist: FieldValues, units: Ints) -> list[float]:
+    """Shape, facing, color, detail and perceived of a patch; lengths in patch diagonals, colors in sRGB."""
+    sdf_d, facing = [], []
+    for p, sdf_r, near_r, near_d in zip(positions, ref.sdf.tolist(), ref.nearest, dist.nearest, strict=True):
+        inside = (-1 if sdf_r < 0 else 1) * (-1 if np.dot(p - near_r, p - near_d) < 0 else 1)
+        sdf_d.append(inside * math.dist(p, near_d))
+        u, w = near_r - p, near_d - p
+        theta = math.atan2(math.hypot(*np.cross(u, w)), abs(float(np.dot(u, w))))
+        facing.append(1.0 if not u.any() or not w.any() else 1 - 2 * theta / math.pi)
+    of_units = [row for unit in units.tolist() for row in perceived_color(positions, ref.channels, dist.channels, unit)]
+    color, detail = (math.fsum(column) / len(of_units) for column in zip(*of_units, strict=True))
+    features = [perceived_shape(ref.sdf.tolist(), sdf_d), math.fsum(facing) / len(facing), color, detail]
+    return [*features, math.prod(features) ** 0.25]

@@ -73,12 +73,15 @@ def pair(seed: int = 0, amount: float = 0.02) -> tuple[MeshArrays, MeshArrays]:
 
 
 def same_bits(one: Result, other: Result) -> bool:
-    fields = [(r.scores, r.patch_scores, r.samples.positions, r.ref.sdf, r.dist.sdf, r.dist.ncf) for r in (one, other)]
+    fields = [
+        (r.scores, r.patch_scores, r.patch_perceived, r.samples.positions, r.ref.sdf, r.dist.sdf, r.dist.ncf)
+        for r in (one, other)
+    ]
     return all(np.array_equal(a, b) for a, b in zip(*fields, strict=True))
 
 
 def check_range(result: Result) -> None:
-    for table in (np.array(result.scores), result.patch_scores):
+    for table in (np.array(result.scores), result.patch_scores, result.perceived, result.patch_perceived):
         assert np.isfinite(table).all()
         assert (table >= 0).all()
         assert (table <= 1).all()
@@ -108,8 +111,8 @@ VARIANTS: list[dict[str, Any]] = [
 def test_itself_is_exactly_1_under_every_option(name: str, variant: dict[str, Any]) -> None:
     mesh = textured(name)
     result = evaluate(mesh, mesh, replace(SMALL, **variant))
-    assert list(result.scores) == [1.0] * 5
-    assert (result.patch_scores == 1.0).all()
+    assert list(result.scores) == result.perceived.tolist() == [1.0] * 5
+    assert (result.patch_scores == 1.0).all() and (result.patch_perceived == 1.0).all()
 
 
 @pytest.mark.parametrize("name", SHAPES)
@@ -118,7 +121,7 @@ def test_itself_is_exactly_1_for_every_shape(name: str, scale: float) -> None:
     """Open, closed, loose, one triangle, slivers; fewer vertices than patches; in any unit."""
     mesh = moved(textured(name), scale, np.array([3.0, -2.0, 1.0]) * scale)
     result = evaluate(mesh, mesh, Settings(samples=640, patches=20, color_units=10))
-    assert list(result.scores) == [1.0] * 5
+    assert list(result.scores) == result.perceived.tolist() == [1.0] * 5
     assert len(result.patches) <= 20
 
 
@@ -221,6 +224,7 @@ def test_a_subset_is_the_first_rows_of_the_whole(centers: str, scored: int) -> N
     part = evaluate(reference, distorted, replace(settings, scored_patches=scored))
     rows = min(scored, 10)
     assert np.array_equal(part.patch_scores, whole.patch_scores[:rows])
+    assert np.array_equal(part.patch_perceived, whole.patch_perceived[:rows])
     assert np.array_equal(part.patch_centers, whole.patch_centers[:rows])
     assert np.array_equal(part.samples.positions, whole.samples.positions[: whole.samples.start[rows]])
 
@@ -424,7 +428,7 @@ def test_more_distortion_scores_less(amounts: tuple[float, ...]) -> None:
 
 def test_warnings_name_what_was_done() -> None:
     split = evaluate(textured("triangle"), textured("triangle"))
-    assert any("split" in warning for warning in split.warnings)
+    assert any("3 vertices are too few for 10 patches" in warning for warning in split.warnings)
     loose = evaluate(textured("loose parts"), textured("loose parts"), Settings(samples=640, patches=1))
     assert [patch.extended for patch in loose.patches] == [True] and not loose.warnings
     assert evaluate(*pair()).warnings == ()
@@ -433,6 +437,13 @@ def test_warnings_name_what_was_done() -> None:
     result = evaluate(replace(reference, warnings=("seen",)), broken)
     assert [warning for warning in result.warnings if warning == "seen"] == ["seen"]
     assert any(warning.startswith("dist: 1 of 80 triangles") for warning in result.warnings)
+
+
+@pytest.mark.parametrize(("patches", "scored", "split"), [(12, None, False), (12, 40, False), (13, 1, True)])
+def test_all_patches_must_find_a_vertex_and_not_the_scored_ones(patches: int, scored: int | None, split: bool) -> None:
+    mesh = textured("icosahedron")
+    result = evaluate(mesh, mesh, Settings(samples=640, patches=patches, scored_patches=scored))
+    assert result.patch_mesh.was_split == split == bool(result.warnings)
 
 
 def test_the_distorted_surface_must_share_the_frame() -> None:

@@ -20,6 +20,7 @@ from fmqm_addon.metric.features import (
     find_pairs,
     geometry_gradient_similarity,
     gradient_similarity,
+    pairs_of_patches,
     pool_features,
     similarity,
     similarity_of_units,
@@ -342,8 +343,8 @@ def features_of(
     positions: Floats, ref: FieldValues, dist: FieldValues, units: Ints, weights: Floats, settings: Settings
 ) -> list[float]:
     """The features of one patch."""
-    start = np.array([0, len(positions)])
-    return features_of_patches(positions, start, ref, dist, units, weights, settings)[0].tolist()
+    start, pairs = np.array([0, len(positions)]), find_pairs(positions, units, settings.radius)
+    return features_of_patches(positions, start, ref, dist, units, pairs, weights, settings)[0].tolist()
 
 
 THRESHOLDS = {"normal_threshold": 0.8, "tangent_threshold": 0.4}
@@ -415,14 +416,9 @@ def test_patches_together_are_the_patches_alone(one: int, other: int) -> None:
     ref, dist = (
         FieldValues(*(joined(name, field) for field in ("nearest", "sdf", "channels"))) for name in ("ref", "dist")
     )
-    together = features_of_patches(
-        joined("positions"),
-        np.array([0, first, first + len(cases[1].positions)]),
-        ref,
-        dist,
-        np.concatenate([cases[0].units, cases[1].units + first]),
-        RGB,
-        settings,
-    )
+    positions, start = joined("positions"), np.array([0, first, first + len(cases[1].positions)])
+    units = np.concatenate([cases[0].units, cases[1].units + first])
+    pairs = pairs_of_patches(positions, start, units, settings.radius)
+    together = features_of_patches(positions, start, ref, dist, units, pairs, RGB, settings)
     alone = [features_of(case.positions, case.ref, case.dist, case.units, RGB, settings) for case in cases]
     np.testing.assert_allclose(together, alone, rtol=1e-12)

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Perceived quality: a second reading of the samples that FMQM is computed from. Lengths are in patch diagonals L.
+
+Not the paper's: four features in the place of its four, with constants that no setting changes (docs/perceived.md).
+Equal inputs cancel exactly, as in the paper's features: both sides of a ratio come from the same sums.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .features import FieldValues, Pairs
+from .geometry import Floats, Ints, cross, dot
+
+PERCEIVED_COLUMNS = ("shape", "facing", "color", "detail", "perceived")
+
+RADIUS = 0.125  # of the color units, in L: about 96 samples, enough for moments
+C1, C2 = 0.01**2, 0.03**2  # SSIM's constants for colors in [0, 1]: contrast below them is not seen
+K = 4 * C2 / RADIUS**2  # C2 as a squared slope over a disc of that radius
+RIDGE = 1e-5  # L^2, added to the variances of positions: a unit that lies in a plane has no slope across it
+LOW_PERCENTILE = 10  # worst places count for people
+
+
+def perceived_of_patches(
+    positions: Floats, start: Ints, ref: FieldValues, dist: FieldValues, units: Ints, near: Pairs
+) -> Floats:
+    """(G, 5) shape, facing, color, detail and perceived of some patches, each in [0, 1].
+
+    Args:
+        positions: (n, 3) samples, patch after patch, each in its own patch's diagonals.
+        start: (G + 1,) patch k is start[k] : start[k + 1].
+        ref, dist: the fields there; their channels are sRGB in [0, 1]. dist.sdf counts without its sign.
+        units: ascending indices of the drawn color units.
+        near: all pairs within RADIUS, each unit with itself among them.
+    """
+    to_ref, to_dist = ref.nearest - positions, dist.nearest - positions
+    sdf_d = side(ref.sdf) * side(dot(to_ref, to_dist)) * np.abs(dist.sdf)
+    facing = facing_similarity(to_ref, to_dist)
+    color, detail = color_similarities(near, units, ref.channels, dist.channels)
+
+    table = np.empty((len(start) - 1, 5))
+    drawn = np.searchsorted(units, start)
+    for k, row in enumerate(table):
+        here, its_units = slice(start[k], start[k + 1]), slice(drawn[k], drawn[k + 1])
+        row[0] = shape_similarity(ref.sdf[here], sdf_d[here])
+        row[1] = facing[here].mean()
+        row[2] = color[:, its_units].mean(axis=1).mean()
+        row[3] = detail[:, its_units].mean(axis=1).mean()
+    table[:, 4] = table[:, :4].prod(axis=1) ** 0.25
+    return table
+
+
+def side(values: Floats) -> Floats:
+    """(n,) -1.0 below 0, else 1.0."""
+    return np.where(values < 0, -1.0, 1.0)
+
+
+def likeness(product: Any, squares: Any, constant: Any) -> Any:
+    """max(0, (2 a b + c) / (a^2 + b^2 + c)), from a b and a^2 + b^2; moments of second order count as these."""
+    return np.clip((2 * product + constant) / (squares + constant), 0.0, 1.0)
+
+
+def shape_similarity(sdf_r: Floats, sdf_d: Floats) -> float:
+    """Cube root of M S C over the samples of a patch: a mean counts on the scale of the spread.
+
+    S C = 2 sqrt(v_r v_d) / (v_r + v_d) max(0, cov / sqrt(v_r v_d)) is a likeness too: the roots cancel.
+    """
+    mean_r, mean_d = sdf_r.mean(), sdf_d.mean()
+    r, d = sdf_r - mean_r, sdf_d - mean_d
+    var_r, var_d = np.mean(r * r), np.mean(d * d)
+    if var_r == 0 or var_d == 0:
+        return float(var_r == var_d and mean_r == mean_d)
+    spread = var_r + var_d
+    mean = likeness(mean_r * mean_d, mean_r * mean_r + mean_d * mean_d, spread)
+    return float(np.cbrt(mean * likeness(np.mean(r * d), spread, 0.0)))
+
+
+def facing_similarity(to_ref: Floats, to_dist: Floats) -> Floats:
+    """(n,) 1 for the same line towards both surfaces, 0 for lines at right angles, linear in the angle between.
+
+    Args:
+        to_ref, to_dist: (n, 3) p_n - p. A sample on either surface counts 1.
+    """
+    across = cross(to_ref, to_dist)
+    angle = np.arctan2(np.sqrt(dot(across, across)), np.abs(dot(to_ref, to_dist)))
+    return 1 - angle / (np.pi / 2)
+
+
+def color_similarities(near: Pairs, units: Ints, colors_r: Floats, colors_d: Floats) -> tuple[Floats, Floats]:
+    """(C, units) color, from the moments of colors over each unit, and (C, units) detail, from their slopes.
+
+    Positions and colors are taken relative to p's, so that the moments of a nearly plain unit do not cancel.
+
+    Args:
+        near: pairs, each unit with itself among them. colors_r, colors_d: (n, C) of all samples.
+    """
+    first = np.searchsorted(near.row, np.arange(len(units)))
+    count = np.diff(first, append=len(near.row))
+
+    def mean(values: Floats) -> Floats:
+        return np.add.reduceat(values, first) / count
+
+    offset = near.offset.T.copy()  # rows that lie in one piece are summed several times faster
+    mean_offset = [mean(axis) for axis in offset]
+    fit = _inverse(
+        {(i, j): mean(offset[i] * offset[j]) - mean_offset[i] * mean_offset[j] + RIDGE * (i == j) for i, j in _HALF}
+    )
+
+    def slope(values: Floats, mean_value: Floats) -> list[Floats]:
+        cov = [
+            mean(axis * values) - mean_axis * mean_value for axis, mean_axis in zip(offset, mean_offset, strict=True)
+        ]
+        return [a * cov[0] + b * cov[1] + c * cov[2] for a, b, c in fit]
+
+    color, detail = [], []
+    for channel_r, channel_d in zip(colors_r.T.copy(), colors_d.T.copy(), strict=True):
+        at_r, at_d = channel_r.take(units), channel_d.take(units)
+        r = channel_r.take(near.other) - at_r.repeat(count)
+        d = channel_d.take(near.other) - at_d.repeat(count)
+        mean_r, mean_d = mean(r), mean(d)
+        variances = (mean(r * r) - mean_r * mean_r) + (mean(d * d) - mean_d * mean_d)
+        contrast = likeness(mean(r * d) - mean_r * mean_d, variances, C2)
+        color.append(_of_vectors([at_r + mean_r], [at_d + mean_d], C1) * contrast)
+        detail.append(_of_vectors(slope(r, mean_r), slope(d, mean_d), K))
+    return np.stack(color), np.stack(detail)
+
+
+def _of_vectors(a: list[Floats], b: list[Floats], constant: float) -> Floats:
+    """Likeness of vectors, given by their components."""
+
+    def product(u: list[Floats], v: list[Floats]) -> Any:
+        return sum(x * y for x, y in zip(u, v, strict=True))
+
+    return likeness(product(a, b), product(a, a) + product(b, b), constant)
+
+
+_HALF = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+
+
+def _inverse(entry: dict[tuple[int, int], Floats]) -> list[tuple[Floats, Floats, Floats]]:
+    """The rows of the inverses of symmetric positive definite 3 x 3 matrices, from their entries in _HALF."""
+    xx, xy, xz, yy, yz, zz = (entry[place] for place in _HALF)
+    a, b, c = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy  # cofactors
+    d, e, f = xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy
+    det = xx * a + xy * b + xz * c
+    return [(a / det, b / det, c / det), (b / det, d / det, e / det), (c / det, e / det, f / det)]
