@@ -73,7 +73,7 @@ def test_pair_agrees_with_an_independent_implementation(
     name, compared = three_seeds
     expected = json.loads((shared_data / "expected.json").read_text(encoding="utf-8"))
     assert tuple(expected["columns"]) == COLUMNS
-    wanted, mine = expected["pairs"][f"{name}/{distortion}"], compared[distortion].scores
+    wanted, mine = expected["pairs"][f"{name}/{distortion}"], np.array(compared[distortion].scores)
     print(name, distortion, *np.round(mine, 4))
     assert (np.abs(mine - wanted["mean"]) <= 2 * np.array(wanted["std"]) + 0.003).all()
 
