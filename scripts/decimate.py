@@ -19,10 +19,13 @@ from typing import TYPE_CHECKING, Any, TextIO
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from fmqm_addon.batch.progress_log import Log
+from fmqm_addon.batch.scorer import REMEDIES
+from fmqm_addon.blender.access import Access
+from fmqm_addon.blender.materials.types import Reading
 from fmqm_addon.cli.process import FAILED, OK, require_bpy, run_script
-from fmqm_addon.metric.errors import FMQMError, SettingsError, one_line
+from fmqm_addon.metric.errors import FMQMError, OutsideError, SettingsError, one_line
 from fmqm_addon.metric.settings import PRESETS, Settings
-from scripts.score import OneLineParser
+from scripts.score import OneLineParser, add_access, check_access
 
 PROGRAM = "decimate.py"
 
@@ -57,6 +60,7 @@ def build_parser() -> OneLineParser:
         help=".glb .obj .ply .stl .fbx .usd, plain meshes as they are measured, without skeletons, shape keys and "
         "animation; or .blend, which keeps these and the modifier live; of a chain NAME_LOD1 and so on",
     )  # fmt: skip
+    add_access(parser)
     parser.add_argument("--json", metavar="FILE", help="targets, versions and paths; - is stdout")
     parser.add_argument("--quiet", action="store_true", help="no progress on stderr")
     return parser
@@ -75,6 +79,7 @@ def main(argv: Sequence[str], out: TextIO) -> int:
     parser.out = out
     args = parser.parse_args(argv)
     try:
+        check_access(args)
         settings = _settings(args)
         targets = _targets(args)
         log = Log(PROGRAM, 1, 1, args.quiet)
@@ -82,7 +87,7 @@ def main(argv: Sequence[str], out: TextIO) -> int:
     except SettingsError as error:
         parser.error(str(error))
     except FMQMError as error:
-        log.say(str(error))
+        log.say(f"{error}{REMEDIES.get(type(error), '') if isinstance(error, OutsideError) else ''}")
         return FAILED
 
 
@@ -127,12 +132,13 @@ def _search(args: argparse.Namespace, targets: list[float], settings: Settings, 
     files = [*outputs, *([args.json] if args.json and args.json != "-" else [])]
     for path in files:
         check_writable(path)
+    reading = Reading(access=Access(args.untrusted, args.asset_root or ""))
     if files:
-        check_outputs(args.reference, files)
-    sizes = () if args.target_texture is None else tuple(texture_sizes(args.reference))
+        check_outputs(args.reference, files, reading)
+    sizes = () if args.target_texture is None else tuple(texture_sizes(args.reference, reading))
     wish = Wish(tuple(targets), args.max_triangles, args.target_texture, sizes)
-    written = written_reader(args.reference, outputs[0]) if outputs else None
-    stepper = reducing(file_reader(args.reference), wish, settings, written)
+    written = written_reader(args.reference, outputs[0], reading) if outputs else None
+    stepper = reducing(file_reader(args.reference, reading), wish, settings, written)
     while stepper.step():
         log.show(stepper.progress.done, stepper.progress.stage)
     log.end()
@@ -145,7 +151,7 @@ def _search(args: argparse.Namespace, targets: list[float], settings: Settings, 
             errors.append(f"{args.reference}: {_missed(outcome, args.max_triangles, args.output)}")
         elif outputs:
             try:
-                warnings += save_version(args.reference, outcome.last.best.version, outputs[number])
+                warnings += save_version(args.reference, outcome.last.best.version, outputs[number], reading)
                 saved[number] = outputs[number]
             except FMQMError as error:
                 errors.append(str(error))

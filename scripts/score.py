@@ -30,8 +30,9 @@ from fmqm_addon.batch.progress_log import Log
 from fmqm_addon.batch.rows import Options, Row, Task
 from fmqm_addon.batch.scorer import score_tasks, units_of, work_off
 from fmqm_addon.batch.workers import Limits, adopt, score_with_workers, workers_command
+from fmqm_addon.blender.access import Access
 from fmqm_addon.blender.materials.types import MAX_BAKE
-from fmqm_addon.cli.process import FAILED, OK, WRONG_ARGUMENTS, blender_version, require_bpy, run_script
+from fmqm_addon.cli.process import FAILED, OK, WRONG_ARGUMENTS, blender_version, machine_memory, require_bpy, run_script
 from fmqm_addon.comparison.alignment import SPACES
 from fmqm_addon.metric.errors import FileError, FMQMError, SettingsError
 from fmqm_addon.metric.settings import CENTERS, COLOR_SPACES, POOLINGS, PRESETS, SETTING_NAMES, Settings
@@ -46,6 +47,7 @@ if TYPE_CHECKING:
     from fmqm_addon.comparison.pair import Answer
 
 PROGRAM = "score.py"
+_STRANGERS = 600.0  # seconds that a pair of strangers' files may take
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -149,6 +151,8 @@ def build_parser() -> OneLineParser:
         "--max-image-bytes", type=int, metavar="N", help="largest size of a decoded image (default: 1 GiB)"
     )
 
+    add_access(reading)
+
     output = parser.add_argument_group("output")
     output.add_argument(
         "--json", metavar="FILE", help="everything as JSON; - is stdout, which then carries nothing else"
@@ -166,6 +170,37 @@ def build_parser() -> OneLineParser:
     output.add_argument("--verbose", action="store_true", help="how far to trust each score: the facts, in a table")
     output.add_argument("--quiet", action="store_true", help="no progress on stderr")
     return parser
+
+
+def add_access(parser: argparse._ActionsContainer) -> None:
+    """The flags of what files may name."""
+    parser.add_argument(
+        "--untrusted", action="store_true",
+        help="files of strangers: they may name only what lies in their own folder and below; score.py scores each "
+        "pair in a watched process, in 600 s and three quarters of the memory unless told otherwise",
+    )  # fmt: skip
+    parser.add_argument("--asset-root", metavar="DIR", help="a folder that they may name files in, too")
+
+
+def check_access(args: argparse.Namespace) -> None:
+    """Raises SettingsError where the flags of add_access do not fit."""
+    if args.asset_root is None:
+        return
+    if not args.untrusted:
+        raise SettingsError("--asset-root is for --untrusted; give both")
+    if not os.path.isdir(args.asset_root):
+        raise SettingsError(f"--asset-root {args.asset_root}: no such folder")
+
+
+def _watched(args: argparse.Namespace) -> Limits:
+    """What a pair may take; strangers' files are watched where nothing else is said."""
+    memory = args.memory_limit and args.memory_limit * 1e9
+    if not args.untrusted:
+        return Limits(args.timeout or Limits.timeout, memory)
+    if not (args.jobs or args.dask or args.worker or args.merge):
+        args.jobs = 1
+    total = machine_memory()
+    return Limits(args.timeout or _STRANGERS, memory or (total and 0.75 * total))
 
 
 def main(argv: Sequence[str], out: TextIO) -> int:
@@ -189,10 +224,12 @@ def main(argv: Sequence[str], out: TextIO) -> int:
             args.bake,
             args.max_image_side,
             args.max_image_bytes,
+            args.untrusted,
+            args.asset_root or "",
         )
+        limits = _watched(args)
         _check_arguments(args)
         options.settings.with_seed(options.settings.seed + args.repeats - 1)
-        limits = Limits(args.timeout or Limits.timeout, args.memory_limit and args.memory_limit * 1e9)
         if args.worker:
             require_bpy()
             work_off(args.worker, options, limits.timeout)
@@ -234,6 +271,9 @@ def _check_arguments(args: argparse.Namespace) -> None:
     for flag in ("journal", "report"):
         if getattr(args, flag) == STDOUT:
             raise SettingsError(f"{_flag(flag)} -: only --json, --csv and --junit can go to stdout; name a path")
+    check_access(args)
+    if args.dask and args.asset_root and not os.path.isabs(args.asset_root):
+        raise SettingsError(f"--asset-root {args.asset_root}: with --dask name the folder from its root on")
     _check_sources(args)
     for flag, least in (("jobs", 1), ("timeout", 0), ("memory_limit", 0)):
         value = getattr(args, flag)
@@ -259,7 +299,7 @@ def _check_arguments(args: argparse.Namespace) -> None:
             continue
         if len(args.distorted) != 1:
             raise SettingsError(f"{_flag(flag)} takes exactly one DISTORTED; {len(args.distorted)} are given")
-        if args.jobs or args.dask or args.resume or args.shard:
+        if args.jobs or args.dask or args.resume or args.shard or args.untrusted:
             raise SettingsError(f"{_flag(flag)} is of a pair that this process scores; leave out the batch's flags")
 
 
@@ -296,7 +336,7 @@ def _rows(args: argparse.Namespace, options: Options) -> list[Row] | None:
         rows = read_manifest(args.manifest, options.settings)
     elif args.lods:
         require_bpy()
-        rows = lod_rows(args.lods)
+        rows = lod_rows(args.lods, Access(options.untrusted, options.asset_root))
     elif args.reference:
         names = glob_files(args.reference, args.glob) if args.glob else args.distorted
         rows = plain_rows(args.reference, names, args.ref_texture or "", args.texture)

@@ -12,6 +12,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
+from ..blender.access import ANYWHERE, Access
 from ..metric.errors import FileError, FMQMError, SettingsError
 from ..metric.settings import SETTING_NAMES, Settings
 from .rows import Row
@@ -58,16 +59,17 @@ def glob_files(reference: str, pattern: str) -> list[str]:
     return found
 
 
-def lod_rows(path: str) -> list[Row]:
+def lod_rows(path: str, access: Access = ANYWHERE) -> list[Row]:
     """Every level of every chain in a file against level 0 and against the level before. Imports bpy.
 
     Raises:
         FileError: it cannot be opened, or no names in it tell levels.
     """
     from ..blender.files.load import chains_of_file
+    from ..blender.materials.types import Reading
 
     rows = []
-    for name, levels in chains_of_file(path):
+    for name, levels in chains_of_file(path, Reading(access=access)):
         for index, (level, asset) in enumerate(levels[1:]):
             for other, reference in dict.fromkeys((levels[0], levels[index])):
                 against = f"LOD{other}" if other >= 0 else "original"

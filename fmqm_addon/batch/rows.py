@@ -23,6 +23,7 @@ class Options:
         report: folder of the report, for pictures; "" makes none. It changes no score.
         both: the other direction, too.
         bake, max_image_side, max_image_bytes: as the flags; None where they are not given.
+        untrusted, asset_root: as the flags; "" where there is none. They change no score.
     """
 
     settings: Settings
@@ -36,6 +37,8 @@ class Options:
     bake: int | None = None
     max_image_side: int | None = None
     max_image_bytes: int | None = None
+    untrusted: bool = False
+    asset_root: str = ""
 
     def settings_of(self, row: Row) -> Settings:
         return replace(self.settings, **dict(row.settings))

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..cli.process import stops_wait
-from ..metric.errors import FMQMError, ImageMissingError, ImageSizeError, OutputError, one_line
+from ..metric.errors import FMQMError, ImageMissingError, ImageSizeError, OutputError, OutsideError, one_line
 from ..report.explain import explain, where
 from ..report.html.pictures import picture_stem, write_pair_pictures
 from ..report.records import PairScore, pair_record
@@ -29,9 +29,10 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 # What the scripts can do about an error; the sidebar cannot.
-_REMEDIES: dict[type[Exception], str] = {
+REMEDIES: dict[type[Exception], str] = {
     ImageMissingError: ", give another (--texture, --ref-texture) or let it be magenta (--bake)",
     ImageSizeError: "; see --max-image-side, --max-image-bytes",
+    OutsideError: ", or allow the folder where it is (--asset-root)",
 }
 
 
@@ -199,7 +200,7 @@ class _Scorer:
 def _told(error: Exception, name: str) -> str:
     """Why there are no scores; what nobody has foreseen is no reason to leave the other pairs alone."""
     if isinstance(error, FMQMError):
-        return str(error) + _REMEDIES.get(type(error), "")
+        return str(error) + REMEDIES.get(type(error), "")
     kind = MemoryError if isinstance(error, MemoryError) else type(error)  # numpy has one of its own
     return one_line(f"{name}: {kind.__name__}: {error}")
 
@@ -220,9 +221,10 @@ def _question(options: Options, row: Row) -> Question:
 
 def _reading(options: Options) -> Reading:
     """How all assets of a run are read, textures of their own aside."""
+    from ..blender.access import Access
     from ..blender.materials.image_headers import DEFAULT_LIMITS, Limits
     from ..blender.materials.types import Reading
 
     limits = Limits(options.max_image_side or DEFAULT_LIMITS.side, options.max_image_bytes or DEFAULT_LIMITS.decoded)
-    reading = Reading(limits=limits)
+    reading = Reading(limits=limits, access=Access(options.untrusted, options.asset_root))
     return reading if options.bake is None else replace(reading, bake=options.bake, stand_in=options.bake > 0)

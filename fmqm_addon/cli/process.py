@@ -12,6 +12,7 @@ import sys
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import NoReturn, TextIO
 
 from ..metric.errors import FMQMError
@@ -112,6 +113,20 @@ def run_script(main: Callable[[Sequence[str], TextIO], int], script: str) -> NoR
         traceback.print_exc()  # Blender would do the same, go on and end with 0
         code = FAILED
     sys.exit(code)
+
+
+def machine_memory() -> int | None:
+    """Bytes of memory that this machine has, or lends to this group of processes; None where it does not tell."""
+    try:
+        found = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, OSError, ValueError):
+        return None
+    for path in ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"):
+        try:
+            found = min(found, int(Path(path).read_text(encoding="ascii")))
+        except (OSError, ValueError):
+            continue
+    return found
 
 
 def take_stdout() -> TextIO:

@@ -37,5 +37,9 @@ class FileError(FMQMError):
     """A file cannot be read or written."""
 
 
+class OutsideError(FileError):
+    """A stranger's file names another that lies where it has no business."""
+
+
 class OutputError(FileError):
     """An output cannot be written, which is no pair's fault: the run stops, and the pair is not taken as done."""

@@ -15,17 +15,20 @@ import bpy
 
 from ...metric.errors import FileError, FMQMError, MeshError, SettingsError
 from ...metric.surface import MeshArrays
+from ..materials.types import Reading
 from ..scene.decimate import Reader, Version, add_modifiers, scene_reader
 from ..scene.members import instanced, scene_members
+from ..scene.mesh_arrays import AS_FOUND
 from .asset_path import split_spec
 from .flatten import ancestors, make_plain
 from .load import last_line, load_mesh, open_file
+from .loaded import mute_imports
 
 NOT_COLOR = "Non-Color"
 _ENDINGS = {"JPEG": ".jpg", "TARGA": ".tga", "TARGA_RAW": ".tga", "OPEN_EXR": ".exr", "TIFF": ".tif"}
 
 
-def open_asset(spec: str) -> list[bpy.types.Object]:
+def open_asset(spec: str, reading: Reading = AS_FOUND) -> list[bpy.types.Object]:
     """Opens a file, as files.load_placed names it, and leaves it open; the objects that are measured.
 
     Raises:
@@ -33,7 +36,7 @@ def open_asset(spec: str) -> list[bpy.types.Object]:
         MeshError: there is no mesh in it that could be decimated.
     """
     path, name = split_spec(spec)
-    open_file(path)
+    open_file(path, reading)
     if name and name not in bpy.data.objects:
         raise FileError(f"{path}: no object named {name} in it")
     objects = [bpy.data.objects[name]] if name else scene_members()
@@ -44,7 +47,7 @@ def open_asset(spec: str) -> list[bpy.types.Object]:
     return objects
 
 
-def file_reader(spec: str) -> Reader:
+def file_reader(spec: str, reading: Reading = AS_FOUND) -> Reader:
     """Reads versions of a file; textures cannot grow again, so that another size opens the file again."""
     names: list[str] = []
     opened: int | None = -1
@@ -52,7 +55,7 @@ def file_reader(spec: str) -> Reader:
     def read(version: Version) -> MeshArrays:
         nonlocal names, opened
         if version.texture != opened or not bpy.data.objects:  # reading back what was written leaves nothing open
-            objects = open_asset(spec)
+            objects = open_asset(spec, reading)
             names, opened = [object_.name_full for object_ in objects], version.texture
             shrink_textures(objects, version.texture)
         return scene_reader(names, spec)(version)
@@ -60,13 +63,13 @@ def file_reader(spec: str) -> Reader:
     return read
 
 
-def texture_sizes(spec: str) -> list[int]:
+def texture_sizes(spec: str, reading: Reading = AS_FOUND) -> list[int]:
     """The longest side of the largest color image, and the powers of two below it; opens the file.
 
     Raises:
         MeshError: no material has a color image.
     """
-    sides = [max(image.size) for image in _color_images(open_asset(spec))]
+    sides = [max(image.size) for image in _color_images(open_asset(spec, reading))]
     if not any(sides):
         raise MeshError(f"{spec}: no material has a color image; there is no texture to make smaller")
     largest = max(sides)
@@ -88,19 +91,19 @@ def shrink_textures(objects: list[bpy.types.Object], size: int | None) -> None:
             image.pack()
 
 
-def written_reader(spec: str, path: str) -> Reader:
+def written_reader(spec: str, path: str, reading: Reading = AS_FOUND) -> Reader:
     """Reads versions of a file as save_version writes them to path, from files beside it that do not stay."""
 
     def read(version: Version) -> MeshArrays:
         with _aside(path) as folder:
             written = folder / Path(path).name
-            _export(spec, version, path, written)
+            _export(spec, version, path, written, reading)
             return load_mesh(str(written))
 
     return read
 
 
-def save_version(spec: str, version: Version, path: str) -> tuple[str, ...]:
+def save_version(spec: str, version: Version, path: str, reading: Reading = AS_FOUND) -> tuple[str, ...]:
     """Opens a file, reduces what is measured of it, and saves that; a .blend keeps the whole scene, the modifiers live.
 
     Returns:
@@ -111,7 +114,7 @@ def save_version(spec: str, version: Version, path: str) -> tuple[str, ...]:
     """
     target = Path(path)
     with _aside(path) as folder:
-        warnings, inputs = _export(spec, version, path, folder / target.name)
+        warnings, inputs = _export(spec, version, path, folder / target.name, reading)
         written = [file for file in folder.rglob("*") if file.is_file()]
         written.sort(key=lambda file: file.name == target.name)  # the one that names the others is moved last
         places = [target.parent / file.relative_to(folder) for file in written]
@@ -123,14 +126,14 @@ def save_version(spec: str, version: Version, path: str) -> tuple[str, ...]:
     return warnings
 
 
-def check_outputs(spec: str, paths: Sequence[str]) -> None:
+def check_outputs(spec: str, paths: Sequence[str], reading: Reading = AS_FOUND) -> None:
     """Refuses outputs that would replace what the asset is read from; opens the file.
 
     Raises:
         SettingsError: one is the file, an image or a material file that it names, or another of the outputs.
         FileError, MeshError: as open_asset.
     """
-    open_asset(spec)
+    open_asset(spec, reading)
     inputs = _inputs(spec)
     for index, path in enumerate(paths):
         for place in (path, str(Path(path).with_suffix(".mtl"))) if path.lower().endswith(".obj") else (path,):
@@ -168,7 +171,9 @@ EXPORTERS: dict[str, Callable[[str], object]] = {
 _NAMING_IMAGES = (".obj", ".fbx", ".usd")  # their exporters want files of the images; .obj goes on naming them
 
 
-def _export(spec: str, version: Version, path: str, written: Path) -> tuple[tuple[str, ...], list[str]]:
+def _export(
+    spec: str, version: Version, path: str, written: Path, reading: Reading
+) -> tuple[tuple[str, ...], list[str]]:
     """Opens and reduces a file, and writes it, with the files that it names beside it.
 
     Args:
@@ -178,9 +183,9 @@ def _export(spec: str, version: Version, path: str, written: Path) -> tuple[tupl
         What should be known of it, and the files that the asset was read from.
     """
     suffix = check_ending(path)
-    objects = open_asset(spec)
+    objects = open_asset(spec, reading)
     inputs, alone = _inputs(spec), bool(split_spec(spec)[1])
-    warnings: tuple[str, ...] = ()
+    warnings = tuple(f"{path}: {told}" for told in mute_imports()) if suffix == ".blend" else ()
     shrink_textures(objects, version.texture)
     for object_ in objects:
         add_modifiers(object_, version.ratio)

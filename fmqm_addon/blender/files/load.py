@@ -16,6 +16,7 @@ import bpy
 from ...comparison.alignment import Placed
 from ...metric.errors import FileError, FMQMError, MeshError, one_line
 from ...metric.surface import MeshArrays
+from ..access import check_asset
 from ..materials.images import TextureCache
 from ..materials.types import Reading
 from ..scene.lods import find_chains
@@ -24,6 +25,8 @@ from ..scene.mesh_arrays import AS_FOUND, to_bake
 from ..scene.target import placed
 from .asset_path import SUFFIXES, split_spec
 from .import_warnings import left_out
+from .loaded import before_evaluation, check_loaded, mute_imports
+from .named import check_names
 from .preflight import check_alembic, check_beside, check_ply
 from .preflight_usd import check_usd
 
@@ -48,7 +51,7 @@ def load_placed(spec: str, reading: Reading = AS_FOUND, announce: Callable[[str]
     """
     path, object_name = split_spec(spec)
     try:
-        unresolved = open_file(path)
+        unresolved = open_file(path, reading)
         objects = [_named(object_name, path)] if object_name else scene_members()
         remarks = (*unresolved, *left_out(path, reading.texture is None))
         name, cache = object_name or Path(path).name, TextureCache()
@@ -69,14 +72,18 @@ def load_placed(spec: str, reading: Reading = AS_FOUND, announce: Callable[[str]
         _clear_session()
 
 
-def open_file(path: str) -> tuple[str, ...]:
-    """Opens or imports a file into an emptied session.
+def open_file(path: str, reading: Reading = AS_FOUND) -> tuple[str, ...]:
+    """Opens or imports a file into an emptied session. Nodes of it that read other files are muted.
+
+    Args:
+        reading: what it may name, and how large its images may be.
 
     Returns:
-        What it refers to and Blender cannot find, as far as that must be asked before.
+        What it refers to and Blender cannot find, as far as that must be asked before, and what was muted.
 
     Raises:
-        FileError: the file is missing, unreadable or of an unknown kind.
+        FileError: the file is missing, unreadable or of an unknown kind, or names what must not be opened.
+        MeshError: an image exceeds the limits; none was decoded.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:
@@ -86,6 +93,8 @@ def open_file(path: str) -> tuple[str, ...]:
         raise FileError(f"{path}: {what}")
     if not os.access(path, os.R_OK):
         raise FileError(f"{path}: permission denied; the file cannot be read")
+    check_asset(path, reading.access)
+    check_names(path, reading.access)
     check_beside(path)
     with _silent(suffix in _NOISY):
         unresolved = _CHECKS[suffix](path) if suffix in _CHECKS else ()
@@ -94,7 +103,7 @@ def open_file(path: str) -> tuple[str, ...]:
         # Blender prints the tracebacks of importers written in Python, each folder where it looks for an image, and
         # what USD finds odd.
         with redirect_stderr(StringIO()), _silent(suffix in _NOISY):
-            _open(os.path.abspath(path), suffix)
+            unresolved += _open(path, suffix, reading)
     except RuntimeError as error:
         said = last_line(error)
         remedy = "export it without this compression, or use another Blender"
@@ -106,14 +115,14 @@ def open_file(path: str) -> tuple[str, ...]:
     return unresolved
 
 
-def chains_of_file(path: str) -> list[tuple[str, list[tuple[int, str]]]]:
+def chains_of_file(path: str, reading: Reading = AS_FOUND) -> list[tuple[str, list[tuple[int, str]]]]:
     """The chains of detail that the names of a file's objects tell: name, and level and object from fine to coarse.
 
     Raises:
         FileError: as open_file.
     """
     try:
-        open_file(path)
+        open_file(path, reading)
         return [
             (name, [(level, object_.name) for level, object_ in levels])
             for name, levels in find_chains(bpy.context.scene)
@@ -146,11 +155,18 @@ def _silent(silent: bool) -> Iterator[None]:
         os.close(kept)
 
 
-def _open(path: str, suffix: str) -> None:
-    """Opens or imports a file into the empty session."""
+def _open(asset: str, suffix: str, reading: Reading) -> tuple[str, ...]:
+    """Opens or imports a file into the empty session; says what was muted."""
+    path, muted = os.path.abspath(asset), list[str]()
+
+    def look() -> None:
+        muted.extend(mute_imports())
+        check_loaded(asset, reading)
+
     if suffix == ".blend":
-        bpy.ops.wm.open_mainfile(filepath=path, load_ui=False, use_scripts=False)
-        return
+        with before_evaluation(look):
+            bpy.ops.wm.open_mainfile(filepath=path, load_ui=False, use_scripts=False)
+        return tuple(muted)
     operator = _IMPORTERS[suffix]()
     try:
         operator.get_rna_type()
@@ -164,6 +180,8 @@ def _open(path: str, suffix: str) -> None:
     for image in bpy.data.images if suffix == ".usdz" else ():
         if image.source == "FILE" and image.packed_file is not None:  # by way of a folder with a name by chance
             image.filepath_raw = os.path.join(path, os.path.basename(image.filepath))
+    look()
+    return tuple(muted)
 
 
 _IMPORTERS: dict[str, Callable[[], bpy.types.Operator]] = {

@@ -6,6 +6,7 @@ from __future__ import annotations
 import hashlib
 import io
 import os
+import re
 import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -27,6 +28,8 @@ _LIGHT_FORMATS = frozenset({"OPEN_EXR", "OPEN_EXR_MULTILAYER", "HDR", "DPX", "CI
 _IS_OLD = bpy.app.version < (5, 2)
 _ODD_KINDS = frozenset({"bmp", "jp2", "sgi", "webp"})  # whose colors an old Cycles does not multiply by alpha
 DARKEST = 1e-4  # what is not black of floats: as linear light, less than bytes can tell from it
+_SMALL = 2**24  # bytes that a process has
+_FRAME = re.compile(r"(.*?)(\d+)(\D*)", re.DOTALL)
 _BLOCK = 2**18  # floats that are converted at a time: what a processor's cache holds
 
 
@@ -308,15 +311,67 @@ def check_limits(image: bpy.types.Image, limits: Limits) -> None:
 
     Raises:
         ImageSizeError: its header promises more than the limits.
-        MeshError: Blender would crash, or wait for ever, at its file.
+        MeshError: Blender would crash, or wait for ever, at its file; or there is no room for its pixels.
     """
-    if not image.packed_files:
-        for path in image_paths(image):
-            if os.path.exists(path) and not (os.path.isfile(path) or os.path.isdir(path)):
-                raise MeshError(f"{path}: the image is a pipe or a device; a file is wanted")
-    header = image_header(image)
-    if header is not None:
-        _check(header, image_path(image) or image.name, limits)
+    name = image_path(image) or image.name
+    needed = 0
+    for place, header in _all_headers(image):
+        if header is not None:
+            _check(header, place or name, limits)
+            needed = max(needed, header.decoded)
+    if not image.has_data:
+        reserve(needed, f"{name}: the image")
+
+
+def _all_headers(image: bpy.types.Image) -> Iterator[tuple[str, Header | None]]:
+    """Path and header of everything that may be decoded for an image: all tiles, all frames; "" is the image itself.
+
+    Raises:
+        MeshError: a path leads to a pipe or a device.
+    """
+    if image.source == "GENERATED" or image.packed_files:
+        yield "", image_header(image)
+        for file in image.packed_files:
+            if file.packed_file is not None:
+                yield "", read_header(io.BytesIO(file.packed_file.data))
+        return
+    paths = image_paths(image)
+    if image.source == "SEQUENCE":
+        paths += _frames(paths[0])
+    for path in paths:
+        if os.path.exists(path) and not (os.path.isfile(path) or os.path.isdir(path)):
+            raise MeshError(f"{path}: the image is a pipe or a device; a file is wanted")
+        yield path, file_header(path)
+
+
+def _frames(path: str) -> list[str]:
+    """The files beside one that differ from it only in the last number of its name."""
+    folder, name = os.path.split(path)
+    match = _FRAME.fullmatch(name)
+    if match is None:
+        return []
+    wanted = re.compile(re.escape(match[1]) + r"\d+" + re.escape(match[3]))
+    try:
+        return sorted(os.path.join(folder, each) for each in os.listdir(folder) if wanted.fullmatch(each))
+    except OSError:
+        return []
+
+
+def reserve(size: int, what: str) -> None:
+    """Tells whether there is room for so many bytes: Blender and Cycles go on without an image that they find none for.
+
+    Raises:
+        MeshError: there is not.
+    """
+    if size < _SMALL:
+        return
+    try:
+        np.empty(size, np.uint8)
+    except MemoryError as error:
+        raise MeshError(
+            f"{what} would take {size:,} bytes once decoded, more than there is memory for; allow more memory, or make "
+            "the image smaller"
+        ) from error
 
 
 def crashes(header: Header | None) -> str:

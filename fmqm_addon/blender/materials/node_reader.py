@@ -52,7 +52,9 @@ from .images import (
     TextureCache,
     black_warnings,
     check_limits,
+    image_header,
     image_path,
+    reserve,
     same_content,
     tile_path,
     tile_place,
@@ -278,13 +280,18 @@ class Reader:
             MeshError: as read_look.
         """
         self._lost = None
+        held: dict[bpy.types.Image, None] = {}
         for node, role in dict.fromkeys(upstream(self._surface)):
-            if node.type != "TEX_IMAGE" or role not in FIRST_ROLES:
+            if node.type not in {"TEX_IMAGE", "TEX_ENVIRONMENT"} or role not in FIRST_ROLES:
                 continue
             if node.image is not None:
                 check_limits(node.image, self._reading.limits)
+                held[node.image] = None
             if role == "base color" and not _has_pixels(node.image):
                 self._missing(node)
+        # Cycles decodes them once more, all at a time, beside what it makes of them.
+        headers = [image_header(image) for image in held]
+        reserve(2 * sum(each.decoded for each in headers if each is not None), f"material {self._name}: its images")
 
     def _missing(self, node: bpy.types.Node) -> Light:
         """What stands in for an image that is missing or broken."""

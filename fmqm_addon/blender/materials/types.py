@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from ...metric.texture import ImageFacts, Material, Texture
+from ..access import ANYWHERE, Access
 from .image_headers import DEFAULT_LIMITS, Limits
 
 MAX_BAKE = 16384  # pixels a side
@@ -21,12 +22,14 @@ class Reading:
         bake: side of baked images in pixels; 0 forbids baking.
         stand_in: a missing base-color image is shown in magenta, as Blender shows it, instead of being an error.
         limits: of the images.
+        access: which files the asset may name.
     """
 
     texture: Texture | None = None
     bake: int = 1024
     stand_in: bool = False
     limits: Limits = DEFAULT_LIMITS
+    access: Access = ANYWHERE
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from ..materials.types import Reading
 from .evaluated import evaluated
 from .members import SURFACE_TYPES, check_object, collection_members, family_members, instanced, is_measured
 from .mesh_arrays import AS_FOUND, mesh_arrays, to_bake
+from .shaping import check_shaping_images
 
 OBJECT, COLLECTION = "OBJECT", "COLLECTION"
 _MOST_PAINTED = 2**24  # values of an image that are looked through, 2048 x 2048 pixels; more would hold up painting
@@ -112,6 +113,7 @@ def placed(
         roots = {_root(object_).name_full: _root(object_) for object_ in objects}
         origin = next(iter(roots.values())) if len(roots) == 1 else None
     matrix = np.eye(4) if origin is None else _matrix_of(origin)
+    check_shaping_images(objects)
     return Placed(mesh_arrays(objects, name, reading, matrix, cache), matrix)
 
 
