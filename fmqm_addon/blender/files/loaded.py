@@ -16,9 +16,16 @@ from ..materials.types import Reading
 from ..scene.shaping import check_memory
 
 _IMPORTS = "GeometryNodeImport"  # how the types of nodes begin that read files: CSV, OBJ, PLY, STL, Text, VDB
-# Whose files nothing reads that is measured.
-_UNREAD = (bpy.types.Text, bpy.types.Scene, bpy.types.WindowManager, bpy.types.Screen, bpy.types.WorkSpace)
-_UNSEEN = (*_UNREAD, bpy.types.World, bpy.types.Light)  # what shows images that are never decoded
+# Whose files nothing reads that is measured; of Geometry Nodes only the muted ones have some.
+_UNREAD = (
+    bpy.types.Text,
+    bpy.types.Scene,
+    bpy.types.WindowManager,
+    bpy.types.Screen,
+    bpy.types.WorkSpace,
+    bpy.types.GeometryNodeTree,
+)
+_UNSEEN = (*_UNREAD[:-1], bpy.types.World, bpy.types.Light)  # what shows images that are never decoded
 
 
 @contextmanager
@@ -57,8 +64,10 @@ def check_loaded(asset: str, reading: Reading) -> None:
         FileError, OutsideError: as access.check_named. ImageSizeError, MeshError: as images.check_limits.
     """
     folder = os.path.dirname(os.path.abspath(asset))
-    for block, names in bpy.data.file_path_map(include_libraries=True).items():
-        if not isinstance(block, _UNREAD) and not _is_packed(block):
+    names = [library.filepath for library in bpy.data.libraries if not _is_packed(library)]
+    check_named(asset, map(bpy.path.abspath, names), folder, reading.access)
+    for block, names in bpy.data.file_path_map().items():
+        if not isinstance(block, (bpy.types.Library, *_UNREAD)) and not _is_packed(block):
             check_named(asset, sorted(_absolute(name, block) for name in names), folder, reading.access)
     for object_ in bpy.data.objects:
         for modifier in object_.modifiers:
@@ -95,7 +104,7 @@ def _is_packed(block: bpy.types.ID) -> bool:
 def _absolute(name: str, block: bpy.types.ID) -> str:
     if isinstance(block, bpy.types.Image) and not block.library and name == block.filepath:
         return image_path(block) or name
-    return bpy.path.abspath(name, library=None if isinstance(block, bpy.types.Library) else block.library)
+    return bpy.path.abspath(name, library=block.library)
 
 
 def _check_bakes(
