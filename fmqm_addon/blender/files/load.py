@@ -161,7 +161,10 @@ def _open(asset: str, suffix: str, reading: Reading) -> tuple[str, ...]:
 
     def look() -> None:
         muted.extend(mute_imports())
-        check_loaded(asset, reading)
+        try:
+            check_loaded(asset, reading)
+        except MeshError as error:
+            raise type(error)(f"{asset}: {error}") from error
 
     if suffix == ".blend":
         with before_evaluation(look):
