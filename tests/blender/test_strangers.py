@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What files may have Blender read: regular files, strangers' files only what lies beside them, images within limits."""
+"""What files may have Blender read: regular ones, of strangers only what lies beside them, images within limits."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ from pathlib import Path
 
 import bpy
 import pytest
+
 from fmqm_addon.blender.access import ANYWHERE, Access
 from fmqm_addon.blender.files.libraries import library_names
 from fmqm_addon.blender.files.load import load_placed
 from fmqm_addon.blender.materials.types import Reading
-from fmqm_addon.metric.errors import FMQMError, ImageSizeError, MeshError, OutsideError
+from fmqm_addon.metric.errors import FMQMError, ImageSizeError, MeshError
 
 from . import scenes
 from .script import SCORE, noise, score, write_png
