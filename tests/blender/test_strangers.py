@@ -451,5 +451,20 @@ def test_no_number_where_there_is_no_memory(tmp_path: Path, way: str) -> None:
     assert "REFUSED" in done.stdout, done.stdout + done.stderr[-500:]
 
 
+def test_the_script_watches_strangers_files(tmp_path: Path) -> None:
+    """In a worker, which gets the flags; a root of their own allows what lies above."""
+    folder = tmp_path / "in"
+    folder.mkdir()
+    corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n"
+    (folder / "plain.obj").write_text(corners)
+    (folder / "naming.obj").write_text(f"mtllib ../m.mtl\n{corners}")
+    pair = (folder / "plain.obj", folder / "naming.obj", "--quiet", "--samples", 2000, "--patches", 10, "--untrusted")
+    refused = score(*pair)
+    assert refused.returncode == 1
+    assert "it names ../m.mtl, which is outside of" in refused.stderr and "--asset-root" in refused.stderr
+    assert score(*pair, "--asset-root", tmp_path).returncode == 0
+    assert score(*pair[:-1], "--asset-root", tmp_path).returncode == 2
+
+
 def test_access_by_default() -> None:
     assert ANYWHERE == Access(False, "")
