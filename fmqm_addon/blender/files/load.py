@@ -27,8 +27,8 @@ from .asset_path import SUFFIXES, split_spec
 from .import_warnings import left_out
 from .loaded import before_evaluation, check_loaded, mute_imports
 from .named import check_names
-from .preflight import check_alembic, check_beside, check_ply
-from .preflight_usd import check_usd
+from .preflight import check_beside
+from .preflight_file import check_file
 
 
 def load_mesh(spec: str, reading: Reading = AS_FOUND) -> MeshArrays:
@@ -97,7 +97,7 @@ def open_file(path: str, reading: Reading = AS_FOUND) -> tuple[str, ...]:
     check_names(path, reading.access)
     check_beside(path)
     with _silent(suffix in _NOISY):
-        unresolved = _CHECKS[suffix](path) if suffix in _CHECKS else ()
+        unresolved = check_file(path)
     _clear_session()
     try:
         # Blender prints the tracebacks of importers written in Python, each folder where it looks for an image, and
@@ -204,8 +204,6 @@ _IMPORTERS: dict[str, Callable[[], bpy.types.Operator]] = {
 _USD = (".usd", ".usda", ".usdc", ".usdz")
 _OPTIONS = dict.fromkeys((*_USD, ".abc"), {"validate_meshes": True})
 _NOISY = {".fbx", ".obj", *_USD}
-_CHECKS: dict[str, Callable[[str], tuple[str, ...]]] = {".abc": check_alembic, ".ply": check_ply}
-_CHECKS |= dict.fromkeys(_USD, check_usd)
 
 
 def _named(name: str, path: str) -> bpy.types.Object:

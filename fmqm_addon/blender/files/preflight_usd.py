@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...metric.errors import FileError
+from .preflight_layers import check_layers, check_point_instances
 
 _ASSET = re.compile("@([^@]+)@")  # in what USD says of a missing one, its name first, then that of who asks
 _UNREAD = ("NurbsPatch", "HermiteCurves", "TetMesh", "Volume")  # kinds of prims that no mesh comes of
@@ -20,7 +21,9 @@ _FARTHEST = 200  # shaders in a row: more take minutes
 
 
 def check_usd(path: str) -> tuple[str, ...]:
-    """A USD file's meshes and curves must hold what they count, and its shaders must not be connected in rings.
+    """A USD file must not compose to too much; its meshes and curves must hold what they count.
+
+    Nor may its shaders be connected in rings.
 
     Returns:
         The references, payloads, layers and images that are missing, and kinds of prims that Blender does not read.
@@ -34,9 +37,11 @@ def check_usd(path: str) -> tuple[str, ...]:
     except ImportError:
         return ()  # Debian's Blender 5 has no pxr, and survives such files
     try:
+        check_layers(path)
         stage = Usd.Stage.Open(path, Usd.Stage.LoadAll)
     except Tf.ErrorException:
         return ()  # the importer says what is wrong
+    check_point_instances(path, stage)
     sources: dict[Any, Any] = {}
     missing: dict[str, None] = {}  # in their order
     unread: dict[str, int] = {}

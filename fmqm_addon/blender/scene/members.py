@@ -9,11 +9,11 @@ from collections.abc import Iterable
 import bpy
 
 from ...metric.errors import MeshError
+from ..limits import MAX_INSTANCES
 
 SURFACE_TYPES = ("MESH", "CURVE", "SURFACE", "FONT", "META")  # objects that Blender shows as meshes
 WANTED = "a mesh, curve, surface, text, metaball or empty is wanted"
 
-_MOST_INSTANCES = 1_000_000  # objects; more take minutes, in which nothing can stop Blender
 _DEEPEST = 8  # collections in one another that Blender shows
 
 _NUMBER = re.compile(r"(.*)\.(\d+)", re.DOTALL)
@@ -63,9 +63,9 @@ def check_instances(objects: Iterable[bpy.types.Object]) -> None:
     for _ in range(_DEEPEST):
         shown |= {each: sum(1 + shown[inner] for inner in nested) for each, nested in held.items()}
     count = sum(shown[root] for root in roots)
-    if count > _MOST_INSTANCES:
+    if count > MAX_INSTANCES:
         raise MeshError(
-            f"its collections show {count:,} objects by instancing each other; at most {_MOST_INSTANCES:,} are measured"
+            f"its collections show {count:,} objects by instancing each other; at most {MAX_INSTANCES:,} are measured"
         )
 
 
