@@ -7,16 +7,18 @@ import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Literal
+from typing import BinaryIO, Literal
 from urllib.parse import quote
 
 import numpy as np
 
 from ...metric.errors import FileError
+from ..limits import MAX_DEPTH
 from ..materials.image_headers import file_header
 from ..materials.images import crashes
 
 _COUNT = re.compile(rb"-?0*\d{1,9}")  # Blender would end the process at 2^31
+_OGAWA_DATA = 1 << 63  # marks the position of data, not of a group
 _JPEG_2000 = (".jp2", ".j2k", ".j2c", ".jpc")
 _PLY_BYTES = {
     **dict.fromkeys(("char", "uchar", "int8", "uint8"), 1),
@@ -69,7 +71,7 @@ def _why_bad(entry: os.DirEntry[str]) -> str:
 
 
 def check_alembic(path: str) -> tuple[str, ...]:
-    """An Ogawa archive must hold its root group, which is written last.
+    """An Ogawa archive must hold its root group, which is written last, and no group twice or too deep.
 
     Magic and version, 8 bytes; position of the root group; that group is the number of its children, then
     their positions. All whole numbers have 8 bytes, little-endian.
@@ -86,9 +88,34 @@ def check_alembic(path: str) -> tuple[str, ...]:
         root = int.from_bytes(header[8:], "little")
         file.seek(min(root, size))
         children = int.from_bytes(file.read(8), "little")
-    if len(header) < 16 or root + 8 + 8 * children > size:
-        raise FileError(f"{path}: the Alembic archive is truncated")
+        if len(header) < 16 or root + 8 + 8 * children > size:
+            raise FileError(f"{path}: the Alembic archive is truncated")
+        _check_groups(path, file, root, size)
     return ()
+
+
+def _check_groups(path: str, file: BinaryIO, root: int, size: int) -> None:
+    """Writers share data, never groups: groups that share groups multiply when they are read."""
+    depths = {root: 1}
+    waiting = [root]
+    while waiting:
+        at = waiting.pop()
+        file.seek(at)
+        count = int.from_bytes(file.read(8), "little")
+        if at + 8 + 8 * count > size:
+            continue  # the importer refuses it
+        for child in np.frombuffer(file.read(8 * count), "<u8").tolist():
+            if not child or child & _OGAWA_DATA or child >= size:
+                continue
+            depth = depths[at] + 1
+            if child in depths:
+                raise FileError(f"{path}: groups of the Alembic archive hold each other; export it again")
+            if depth > MAX_DEPTH:
+                raise FileError(
+                    f"{path}: its groups are nested more than {MAX_DEPTH:,} deep; export it with fewer parents"
+                )
+            depths[child] = depth
+            waiting.append(child)
 
 
 def check_ply(path: str) -> tuple[str, ...]:
@@ -108,8 +135,10 @@ def check_ply(path: str) -> tuple[str, ...]:
             said = line.decode("latin-1")[:80]
             raise FileError(f"{path}: the PLY header says {said!r}; a name and a count below a billion are wanted")
     order: Literal["little", "big"] = "big" if b"format binary_big_endian" in header else "little"
+    if data.startswith(b"ply") and b"format ascii" in header and len(header) < len(data):
+        _check_text(path, header, len(data) - len(header))
     if not data.startswith(b"ply") or b"format binary_" not in header or len(header) == len(data):
-        return ()  # text, whose end the importer notices, or what it refuses anyway
+        return ()  # text, or what the importer refuses anyway
     position = data.find(b"\n", len(header)) + 1
     try:
         for count, properties in _ply_elements(header.decode("latin-1")):
@@ -131,6 +160,16 @@ def check_ply(path: str) -> tuple[str, ...]:
     if position > len(data):
         raise FileError(f"{path}: the PLY file is truncated")
     return ()
+
+
+def _check_text(path: str, header: bytes, length: int) -> None:
+    """Each value takes a digit and a blank: Blender makes room for all elements before it reads one."""
+    try:
+        wanted = sum(2 * count * len(properties) for count, properties in _ply_elements(header.decode("latin-1")))
+    except (KeyError, ValueError, IndexError):
+        return  # a header that the importer judges
+    if wanted > length:
+        raise FileError(f"{path}: the PLY header promises more elements than the file holds; export it again")
 
 
 def _alike(

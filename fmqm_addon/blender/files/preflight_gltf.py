@@ -10,7 +10,7 @@ from typing import Any
 from urllib.parse import unquote
 
 from ...metric.errors import FileError
-from ..limits import MAX_BYTES, MAX_DEPTH, MAX_KEYS, MAX_OBJECTS, MAX_TRIANGLES
+from ..limits import MAX_BYTES, MAX_DEPTH, MAX_KEYS, MAX_OBJECTS, MAX_TRIANGLES, MAX_ZEROS
 
 _COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 _SIZES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}  # bytes of a component
@@ -90,6 +90,7 @@ class _Promises:
             for name in _MESHOPT:
                 packed = _dict(_dict(view, "extensions"), name)
                 unpacked += max(_count(packed.get("count")) * _count(packed.get("byteStride")), 0)
+        zeros = 0
         for number, accessor in enumerate(self._accessors):
             name, count, size = f"accessor {number}", _count(accessor.get("count")), _element(accessor)
             if count < 0:
@@ -97,15 +98,17 @@ class _Promises:
             if "bufferView" in accessor:
                 self._check_fits(name, count, size, accessor)
             else:
-                unpacked += count * size
+                zeros += count * size
             sparse = _dict(accessor, "sparse")
             changed, indices, values = _count(sparse.get("count")), _dict(sparse, "indices"), _dict(sparse, "values")
             if not 0 <= changed <= count:
                 raise self._refused(f"{name} of {count:,} elements changes {changed:,} of them")
             self._check_fits(f"{name}'s indices", changed, _size(indices), indices)
             self._check_fits(f"{name}'s values", changed, size, values)
+        if zeros > MAX_ZEROS:
+            raise self._refused(f"its accessors promise {zeros:,} bytes without data", MAX_ZEROS)
         if unpacked > MAX_BYTES:
-            raise self._refused(f"its buffers and accessors unpack to {unpacked:,} bytes", MAX_BYTES)
+            raise self._refused(f"its buffers unpack to {unpacked:,} bytes", MAX_BYTES)
 
     def check_nodes(self) -> None:
         """Nodes in one another, and how many objects come of them."""

@@ -55,11 +55,6 @@ def check_text(path: str) -> None:
 
 def _check_archive(path: str) -> None:
     with zipfile.ZipFile(path) as archive:
-        size = sum(info.file_size for info in archive.infolist())
-        if size > MAX_BYTES:
-            raise FileError(
-                f"{path}: it unpacks to {size:,} bytes; at most {MAX_BYTES:,} are measured; divide the file"
-            )
         for info in archive.infolist():
             # USD reads only what is stored as it is.
             if info.filename.lower().endswith((".usd", ".usda")) and info.compress_type == zipfile.ZIP_STORED:
@@ -144,7 +139,9 @@ def _arcs(node: Any) -> list[Any]:
     """What an instance is made of but for its own opinions: USD shares a prototype among those that agree."""
     found = []
     for child in node.children:
-        found += [(str(child.arcType), str(child.path), str(child.layerStack.identifier)), *_arcs(child)]
+        if not child.IsDueToAncestor():
+            found.append((str(child.arcType), str(child.path), str(child.layerStack.identifier)))
+        found += _arcs(child)
     return found
 
 

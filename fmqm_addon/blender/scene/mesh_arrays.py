@@ -20,6 +20,7 @@ from ...metric.geometry import Floats
 from ...metric.surface import MeshArrays, join_meshes
 from ...metric.texture import Material
 from ..baking.bake import Baked, bake_slots, copy_properties
+from ..limits import MAX_TRIANGLES
 from ..materials.expressions import Encoded, VertexColor
 from ..materials.images import DARKEST, TextureCache
 from ..materials.read_material import plain_look, read_look
@@ -60,6 +61,7 @@ def mesh_arrays(
     shapes: dict[_Key, _Shape | None] = {}
     places: list[_Place] = []
     particles: Counter[str] = Counter()
+    triangles = 0
     with evaluated(objects) as found, ExitStack() as temporary:
         order = {each.original.as_pointer(): index for index, each in enumerate(found)}
         for each in shown(found):
@@ -69,7 +71,11 @@ def mesh_arrays(
             key = _key(each)
             if key not in shapes:
                 shapes[key] = _read_shape(each, cache, reading, temporary)
-            if shapes[key] is not None:
+            shape = shapes[key]
+            if shape is not None:
+                triangles += len(shape.triangles)
+                if triangles > MAX_TRIANGLES:
+                    raise MeshError(f"{name}: its instances show more than {MAX_TRIANGLES:,} triangles; measure a part")
                 matrix = _relative(each.matrix, frame, each.name)
                 places.append(_Place(order[each.owner.original.as_pointer()], each.name, matrix, key))
         remarks = _left_out(found)
