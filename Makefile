@@ -12,7 +12,7 @@ RUN = $(VENV)/bin/python
 # Blender's own tool for extensions, which needs no Blender.
 EXTENSION_TOOL = $(RUN) $(VENV)/lib/python*/site-packages/bpy/*/scripts/addons_core/bl_pkg/cli/blender_ext.py
 
-.PHONY: demo extension test test-all bench lint clean
+.PHONY: demo extension test test-all stress bench lint clean
 
 demo: $(VENV)/runs
 	$(RUN) scripts/demo.py --out out/demo
@@ -32,6 +32,12 @@ test-all:
 	@test -n "$(PYTHON_311)$(PYTHON_313)" || { echo "neither Python 3.11 nor 3.13 found"; exit 1; }
 	@if [ -n "$(PYTHON_311)" ]; then $(MAKE) test PYTHON=$(PYTHON_311); else echo "no Python 3.11: Blender 4.5 not tested"; fi
 	@if [ -n "$(PYTHON_313)" ]; then $(MAKE) test PYTHON=$(PYTHON_313) $(if $(PYTHON_311),ARGS='-m "not once"'); else echo "no Python 3.13: Blender 5.2 not tested"; fi
+
+# Minutes: hostile files under limits of memory and time, then runs that are killed at random and resumed. A part of it
+# is in `make test`.
+stress: $(VENV)/tests
+	$(RUN) -m tests.stress.corpus
+	$(RUN) -m tests.stress.kills $(or $(ROUNDS),50) $(SEED)
 
 bench: $(VENV)/runs
 	$(RUN) scripts/bench.py $(ARGS)

@@ -95,6 +95,7 @@ PLY: dict[str, tuple[bytes, Outcome]] = {
     "list_that_promises_more": (ply(3, 1, CORNERS + "200 0 1 2\n"), "no faces"),
     "more_vertices_promised": (ply(2_000_000_000, 1, CORNERS + "3 0 1 2\n"), "the PLY header"),
     "more_faces_promised": (ply(3, 2_000_000_000, CORNERS + "3 0 1 2\n"), "the PLY header"),
+    "900_million_in_text": (ply(900_000_000, 1, CORNERS + "3 0 1 2\n"), "promises more elements than the file holds"),
     "more_than_2_to_the_31": (ply(9_999_999_999, 1, CORNERS + "3 0 1 2\n"), "the PLY header"),
     "more_than_2_to_the_64": (ply(10**25, 1, CORNERS + "3 0 1 2\n"), "the PLY header"),
     "binary_promises": (ply(2_000_000_000, 1, "", "binary_little_endian 1.0") + b"x" * 50, "the PLY header"),
@@ -146,7 +147,7 @@ PLY: dict[str, tuple[bytes, Outcome]] = {
         "unknown error",
     ),
     "property_before_elements": (b"ply\nformat ascii 1.0\nproperty float x\nend_header\n", "the PLY header"),
-    "short_rows": (ply(3, 1, "0 0\n1\n\n3 0 1 2\n"), "unknown error"),
+    "short_rows": (ply(3, 1, "0 0\n1\n\n3 0 1 2\n"), "promises more elements than the file holds"),
 }
 
 # STL
@@ -248,6 +249,24 @@ def nested(depth: int) -> list[dict[str, Any]]:
     return [{"children": [k + 1]} for k in range(depth)] + [{"mesh": 0}]
 
 
+def sparse(changed_count: int, count: int, view: int = 1, offset: int = 0) -> dict[str, Any]:
+    """The triangle, whose first accessor changes some of its elements."""
+    values = {"bufferView": 0}
+    indices = {"bufferView": view, "byteOffset": offset, "componentType": 5123}
+    return changed("accessors", 0, count=count, sparse={"count": changed_count, "indices": indices, "values": values})
+
+
+def instances(count: int) -> dict[str, Any]:
+    """The triangle, at so many places that all are the origin."""
+    result = document(
+        nodes=[{"mesh": 0, "extensions": {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": 2}}}}]
+    )
+    result["accessors"].append({"componentType": 5126, "count": count, "type": "VEC3"})
+    return result | {"extensionsUsed": ["EXT_mesh_gpu_instancing"]}
+
+
+MESHOPT = {"byteStride": 12, "count": 10**10, "mode": "ATTRIBUTES"}
+
 GLTF: dict[str, tuple[Any, Outcome]] = {
     "plain": (document(), 1.0),
     "version_1": (document(asset={"version": "1.0"}), "glTF version must be 2.0"),
@@ -268,7 +287,7 @@ GLTF: dict[str, tuple[Any, Outcome]] = {
         "the importer broke off",
     ),
     "deep_nodes": (document(nodes=nested(150)), 1.0),
-    "very_deep_nodes": (document(nodes=nested(3000)), "the importer broke off"),
+    "very_deep_nodes": (document(nodes=nested(20_000)), "nested 20,001 deep; at most 500"),
     "scale_zero": (document(nodes=[{"mesh": 0, "scale": [0, 0, 0]}]), "zero area"),
     "scale_zero_on_one_axis": (document(nodes=[{"mesh": 0, "scale": [1, 1, 0]}]), 1.0),
     "scale_negative": (document(nodes=[{"mesh": 0, "scale": [-1, 2, 3]}]), 1.0),
@@ -289,10 +308,63 @@ GLTF: dict[str, tuple[Any, Outcome]] = {
     "accessor_negative": (primitive(attributes={"POSITION": -1}), "the importer broke off"),
     "indices_beyond": (document(indices=struct.pack("<4H", 0, 1, 60000, 0)), "the importer broke off"),
     "indices_of_floats": (changed("accessors", 1, componentType=5126, count=1), "the importer broke off"),
-    "count_beyond_buffer": (changed("accessors", 0, count=4000), "the importer broke off"),
-    "count_huge": (changed("accessors", 0, count=10**13), "the importer broke off"),
+    "count_beyond_buffer": (changed("accessors", 0, count=4000), "its buffer holds"),
+    "count_huge": (changed("accessors", 0, count=10**13), "its buffer holds"),
     "count_zero": (changed("accessors", 0, count=0), "the importer broke off"),
-    "count_negative": (changed("accessors", 0, count=-3), 1.0),
+    "count_negative": (changed("accessors", 0, count=-3), "has -3 elements"),
+    "count_without_data": (changed("accessors", 0, bufferView=None, count=400_000_000), "without data; at most"),
+    "stride_negative": (changed("bufferViews", 0, byteStride=-4), "a stride of -4"),
+    "offset_negative": (changed("accessors", 0, byteOffset=-12), "an offset of -12"),
+    "sparse_count_beyond": (sparse(9, 3), "changes 9 of them"),
+    "sparse_indices_beyond": (sparse(3, 3, view=1, offset=4), "indices promises 3 elements"),
+    "sparse": (sparse(1, 3), 1.0),
+    "instances": (instances(3), 1.0),
+    "instances_by_the_thousands": (instances(200_000), "make 200,001 objects; at most 100,000"),
+    "scenes_that_list_all_again": (
+        document(scenes=[{"nodes": [0]}] * 900, nodes=[*nested(150)]),
+        "make 135,900 objects",
+    ),
+    "nodes_that_share_a_mesh": (
+        document(scenes=[{"nodes": list(range(500))}], nodes=[{"mesh": 0}] * 500),
+        1.0,
+    ),
+    "primitives_that_share_vertices": (
+        document(
+            meshes=[{"primitives": [{"attributes": {"POSITION": 2}}] * 40}],
+            accessors=[{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}] * 2
+            + [{"componentType": 5126, "count": 80_000_000, "type": "VEC3"}],
+        ),
+        "without data; at most",
+    ),
+    "nodes_that_multiply_triangles": (
+        document(
+            scenes=[{"nodes": list(range(300))}],
+            nodes=[{"mesh": 0}] * 300,
+            meshes=[{"primitives": [{"attributes": {"POSITION": 0}, "indices": 2}]}],
+            accessors=[*document()["accessors"], {"componentType": 5121, "count": 3_000_000, "type": "SCALAR"}],
+        ),
+        "make 300,000,000 triangles; at most 200,000,000",
+    ),
+    "targets_that_multiply_keys": (
+        document(
+            meshes=[{"primitives": [{"attributes": {"POSITION": 0}, "targets": [{"POSITION": 0}] * 300}]}],
+            accessors=[{"componentType": 5126, "count": 80_000, "type": "VEC3"}],
+        ),
+        "hold 24,000,000 keys; at most 20,000,000",
+    ),
+    "meshopt_that_promises": (
+        document(
+            bufferViews=[
+                {
+                    "buffer": 0,
+                    "byteLength": 36,
+                    "extensions": {"EXT_meshopt_compression": {"buffer": 0, "byteLength": 9} | MESHOPT},
+                }
+            ]
+            * 2
+        ),
+        "its buffers unpack to",
+    ),
     "accessor_without_view": (
         document(
             accessors=[
@@ -306,21 +378,21 @@ GLTF: dict[str, tuple[Any, Outcome]] = {
     "type_unknown": (changed("accessors", 0, type="VEC9"), "the importer broke off"),
     "positions_of_2": (changed("accessors", 0, type="VEC2"), "the importer broke off"),
     "view_beyond_buffer": (changed("bufferViews", 0, byteLength=10**9), 1.0),
-    "view_offset_beyond": (changed("bufferViews", 0, byteOffset=10**6), "the importer broke off"),
+    "view_offset_beyond": (changed("bufferViews", 0, byteOffset=10**6), "its buffer holds"),
     "stride_zero": (changed("bufferViews", 0, byteStride=0), 1.0),
-    "stride_huge": (changed("bufferViews", 0, byteStride=10**6), "the importer broke off"),
+    "stride_huge": (changed("bufferViews", 0, byteStride=10**6), "its buffer holds"),
     "buffer_beyond": (changed("bufferViews", 0, buffer=9), "the importer broke off"),
     "buffer_of_broken_base64": (
         document(buffers=[{"byteLength": 44, "uri": "data:application/octet-stream;base64,%%%"}]),
-        "the importer broke off",
+        "its buffer holds 2 bytes",
     ),
     "buffer_on_the_web": (
         document(buffers=[{"byteLength": 44, "uri": "http://localhost:9/x.bin"}]),
         "Missing resource",
     ),
     "buffer_is_a_folder": (document(buffers=[{"byteLength": 44, "uri": "."}]), "Missing resource"),
-    "buffer_without_uri": (document(buffers=[{"byteLength": 44}]), "the importer broke off"),
-    "buffer_shorter": (document(buffers=[{"byteLength": 44, "uri": uri(TRIANGLE[:20])}]), "the importer broke off"),
+    "buffer_without_uri": (document(buffers=[{"byteLength": 44}]), "its buffer holds 0 bytes"),
+    "buffer_shorter": (document(buffers=[{"byteLength": 44, "uri": uri(TRIANGLE[:20])}]), "its buffer holds"),
     "nan_positions": (document(np.array([[0, 0, 0], [1, 0, 0], [np.nan, 1, 0]], "<f4").tobytes()), (1.0, "zero area")),
     "flat_positions": (document(bytes(36)), "zero area"),
     "extension_required": (
@@ -390,7 +462,7 @@ GLTF: dict[str, tuple[Any, Outcome]] = {
     "empty_object": ({}, "Bad glTF"),
 }
 GLTF_TEXT: dict[str, tuple[str, Outcome]] = {
-    "deep_json": ("[" * 100000, "the importer broke off"),
+    "deep_json": ("[" * 100000, "nested too deeply"),
     "trailing_comma": ('{"asset": {"version": "2.0"},}', "Bad glTF"),
     "utf16": (json.dumps(document()).encode("utf-16").decode("latin-1"), "Bad glTF"),
     "bom": ("\ufeff" + json.dumps(document()), "Bad glTF"),
@@ -423,7 +495,7 @@ GLB: dict[str, tuple[bytes, Outcome]] = {
     "json_length_huge": (glb(json_length=2**32 - 1), "Bad GLB"),
     "json_length_zero": (glb(json_length=0), "Bad glTF"),
     "binary_length_huge": (glb(binary_length=2**32 - 1), "Bad GLB"),
-    "binary_length_zero": (glb(binary_length=0), "the importer broke off"),
+    "binary_length_zero": (glb(binary_length=0), "its buffer holds 0 bytes"),
     "first_chunk_unknown": (glb(kind=b"ABCD"), "Bad GLB"),
     "magic_alone": (b"glTF", "the importer broke off"),
     "header_alone": (struct.pack("<4sII", b"glTF", 2, 12), "the importer broke off"),
@@ -470,7 +542,47 @@ def shaders(count: int, last: str) -> str:
     )
 
 
+def laughs(levels: int, arc: str = "references") -> str:
+    """Classes of ten that refer to the class before: 10 ** levels triangles."""
+    classes = ['class "L0" {\n' + usd().partition("\n")[2] + "\n}\n"]
+    for level in range(1, levels + 1):
+        children = "".join(f'def Xform "c{k}" (\n{arc} = </L{level - 1}>\n) {{\n}}\n' for k in range(10))
+        classes.append(f'class "L{level}" {{\n{children}}}\n')
+    return "#usda 1.0\n" + "".join(classes) + f'def Xform "root" (\n{arc} = </L{levels}>\n) {{\n}}\n'
+
+
+def deep(depth: int, between: str = "") -> str:
+    """A mesh below so many prims; between: what stands in each of these."""
+    inner = usd().partition("\n")[2] + "\n"
+    return "#usda 1.0\n" + f'def Xform "a" {{\n{between}\n' * depth + inner + "}\n" * depth
+
+
+def scattered(points: int, prototype: str = "", levels: int = 1) -> str:
+    """A triangle, or what is given, by point instancers in one another."""
+    inner = prototype or usd().partition("\n")[2] + "\n"
+    for level in range(levels):
+        inner = (
+            f'def PointInstancer "I{level}" {{\nrel prototypes = <P{level}>\n'
+            f"int[] protoIndices = [{', '.join('0' * points)}]\n"
+            f"point3f[] positions = [{', '.join(f'({k}, {level}, 0)' for k in range(points))}]\n"
+            f'def Xform "P{level}" {{\n{inner}}}\n}}\n'
+        )
+    return "#usda 1.0\n" + inner
+
+
 USDA: dict[str, tuple[str, Outcome]] = {
+    "references_in_references": (laughs(2), 1.0),
+    "references_without_end": (laughs(8), "compose more than 100,000 prims"),
+    "payloads_without_end": (laughs(8, "payload"), "compose more than 100,000 prims"),
+    "inherits_without_end": (laughs(8, "inherits"), "compose more than 100,000 prims"),
+    "instances_of_instances": (laughs(8, "instanceable = true\nreferences"), "prims; at most 1,000,000"),
+    "deep_prims": (deep(200), 1.0),
+    "very_deep_prims": (deep(20_000), "deep; at most 500"),
+    "deeper_than_their_reader_can": (deep(100_000), "deep; at most 500"),
+    "deep_behind_comments": (deep(1000, '# }\n// }\n/* } */\nstring s = "}"'), "deep; at most 500"),
+    "brackets_in_texts": (usd(more='string s = """' + "{" * 900 + '"""\n# ' + "(" * 900), 1.0),
+    "point_instancer": (scattered(4), 1.0),
+    "point_instancers_in_one_another": (scattered(300, levels=3), "prims; at most 1,000,000"),
     "no_default_prim": (usd(), 1.0),
     "index_beyond": (usd(indices="0,1,900"), "no faces"),
     "index_negative": (usd(indices="0,1,-1"), "no faces"),

@@ -95,7 +95,7 @@ class _Promises:
             name, count, size = f"accessor {number}", _count(accessor.get("count")), _element(accessor)
             if count < 0:
                 raise self._refused(f"{name} has {count:,} elements")
-            if "bufferView" in accessor:
+            if accessor.get("bufferView") is not None:
                 self._check_fits(name, count, size, accessor)
             else:
                 zeros += count * size
@@ -142,7 +142,7 @@ class _Promises:
         corners = keys = 0
         for primitive in _list(mesh, "primitives"):
             vertices = self._elements(_dict(primitive, "attributes").get("POSITION"))
-            indices = self._elements(primitive["indices"]) if "indices" in primitive else vertices
+            indices = vertices if primitive.get("indices") is None else self._elements(primitive["indices"])
             strips = primitive.get("mode") in (5, 6)  # each vertex makes a triangle
             corners += indices * (3 if strips else 1)
             keys += min(vertices, indices) * len(_list(primitive, "targets"))
