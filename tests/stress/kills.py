@@ -135,7 +135,7 @@ def disturbed_round(arguments: list[str], calm: tuple[object, bytes], folder: Pa
 
 
 def _leave_what_is_no_journal(journal: Path) -> None:
-    """A file in which not one line is left is somebody else's for all the run knows, and refused: the user removes it."""
+    """A file without one whole line is another program's for all the run knows, and refused: the user removes it."""
     if journal.exists() and not any(map(parse_line, journal.read_bytes().splitlines())):
         journal.unlink()
 

@@ -86,29 +86,32 @@ def check_layers(path: str) -> None:
     _check_texts_below(Sdf.Layer.FindOrOpen(path))
     stage = Usd.Stage.OpenMasked(path, Usd.StagePopulationMask())  # the pseudo-root alone
     cache = stage._GetPcpCache()
-    waiting = [Sdf.Path.absoluteRootPath]
+    prims = [Sdf.Path.absoluteRootPath]  # of one depth
     prototypes: set[Any] = set()
-    count = 0
-    while waiting:
-        prim = waiting.pop()
-        count += 1
+    count = depth = 0
+    while prims:
+        count += len(prims)
         if count > MAX_PRIMS:
             raise FileError(
                 f"{path}: its references, payloads and variants compose more than {MAX_PRIMS:,} prims; "
                 "measure a part of it, or export it without them"
             )
-        if prim.pathElementCount > MAX_DEPTH:
-            raise FileError(_too_deep(path, prim.pathElementCount))
-        index, _ = cache.ComputePrimIndex(prim)
-        if index.hasAnyPayloads:
-            cache.RequestPayloads([prim], [])
-            index, _ = cache.ComputePrimIndex(prim)
-        if index.IsInstanceable():  # composed once for all that are alike
-            alike = tuple(_arcs(index.rootNode))
-            if alike in prototypes:
-                continue
-            prototypes.add(alike)
-        waiting += [prim.AppendChild(name) for name in index.ComputePrimChildNames()[0]]
+        if depth > MAX_DEPTH:
+            raise FileError(_too_deep(path, depth))
+        indices = [cache.ComputePrimIndex(prim)[0] for prim in prims]
+        payloads = [prim for prim, index in zip(prims, indices, strict=True) if index.hasAnyPayloads]
+        if payloads:
+            cache.RequestPayloads(payloads, [])
+            indices = [cache.ComputePrimIndex(prim)[0] for prim in prims]
+        below = []
+        for prim, index in zip(prims, indices, strict=True):
+            if index.IsInstanceable():  # composed once for all that are alike
+                alike = tuple(_arcs(index.rootNode))
+                if alike in prototypes:
+                    continue
+                prototypes.add(alike)
+            below += [prim.AppendChild(name) for name in index.ComputePrimChildNames()[0]]
+        prims, depth = below, depth + 1
 
 
 def _check_texts_below(root: Any) -> None:
