@@ -22,9 +22,8 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from fmqm_addon.blender.files.asset_path import SUFFIXES
-
-from ..blender.hostile_files import all_files
-from ..blender.script import COLUMNS, SCORE
+from tests.blender.hostile_files import all_files
+from tests.blender.script import COLUMNS, SCORE
 
 ROOT = Path(__file__).resolve().parents[2]
 SHARED = ROOT.parent / "shared" / "data"

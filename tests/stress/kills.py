@@ -20,8 +20,7 @@ import time
 from pathlib import Path
 
 from fmqm_addon.batch.journal import parse_line
-
-from ..blender.script import SCORE, noise, read_json, without_seconds, write_png, write_torus
+from tests.blender.script import SCORE, noise, read_json, without_seconds, write_png, write_torus
 
 PAIRS = 8
 FLAGS = ("--samples", "320", "--patches", "5", "--color-units", "10", "--quiet")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from . import corpus, kills
+from tests.stress import corpus, kills
 
 # Each would crash, hang or swell the process if it were not refused before its import.
 WORST = (
