@@ -26,7 +26,7 @@ PAIRS = 8
 FLAGS = ("--samples", "320", "--patches", "5", "--color-units", "10", "--quiet")
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 SECONDS = 600.0  # for a run that is let go: machines are busy
-DAMAGES = ("none", "flip", "flip a digit", "cut the end", "cut a piece", "insert")
+DAMAGES = ("none", "flip", "flip a digit", "flip a digit", "cut the end", "cut a piece", "insert")
 
 
 def write_assets(folder: Path) -> list[str]:
