@@ -16,6 +16,7 @@ import bpy
 from ...metric.errors import FileError, OutsideError
 from ..access import ANYWHERE, Access, check_named
 from .libraries import library_names
+from .preflight_layers import check_text
 
 _CONTINUED = re.compile(rb"\\[ \t\r]*\n")
 _LIBRARY = re.compile(rb"(?:^|\n)[ \t]*mtllib[ \t]+((?:\\[ \t\r]*\n|[^\n])*)")
@@ -149,6 +150,7 @@ def _check_usd(path: str, access: Access) -> None:
         if os.path.realpath(layer) in seen or not os.path.isfile(layer):
             continue
         seen.add(os.path.realpath(layer))
+        check_text(layer)
         try:
             names = [name for names in UsdUtils.ExtractExternalReferences(layer) for name in names]
         except Tf.ErrorException:
