@@ -22,7 +22,8 @@ from fmqm_addon.batch.progress_log import Log
 from fmqm_addon.batch.scorer import REMEDIES
 from fmqm_addon.blender.access import Access
 from fmqm_addon.blender.materials.types import Reading
-from fmqm_addon.cli.process import FAILED, OK, require_bpy, run_script
+from fmqm_addon.cli.process import FAILED, OK, prepare_bpy, run_script
+from fmqm_addon.cli.stops import stops_wait
 from fmqm_addon.metric.errors import FMQMError, OutsideError, SettingsError, one_line
 from fmqm_addon.metric.settings import PRESETS, Settings
 from scripts.score import OneLineParser, add_access, check_access
@@ -114,7 +115,7 @@ def _targets(args: argparse.Namespace) -> list[float]:
 
 def _search(args: argparse.Namespace, targets: list[float], settings: Settings, log: Log, out: TextIO) -> int:
     """Searches, prints, writes; Blender is imported only once the arguments are known to be good."""
-    require_bpy()
+    prepare_bpy()
     from fmqm_addon.blender.files.export import (
         check_ending,
         check_outputs,
@@ -135,11 +136,15 @@ def _search(args: argparse.Namespace, targets: list[float], settings: Settings, 
     reading = Reading(access=Access(args.untrusted, args.asset_root or ""))
     if files:
         check_outputs(args.reference, files, reading)
-    sizes = () if args.target_texture is None else tuple(texture_sizes(args.reference, reading))
+    with stops_wait():
+        sizes = () if args.target_texture is None else tuple(texture_sizes(args.reference, reading))
     wish = Wish(tuple(targets), args.max_triangles, args.target_texture, sizes)
     written = written_reader(args.reference, outputs[0], reading) if outputs else None
     stepper = reducing(file_reader(args.reference, reading), wish, settings, written)
-    while stepper.step():
+    more = True
+    while more:
+        with stops_wait():
+            more = stepper.step()
         log.show(stepper.progress.done, stepper.progress.stage)
     log.end()
 
@@ -151,7 +156,8 @@ def _search(args: argparse.Namespace, targets: list[float], settings: Settings, 
             errors.append(f"{args.reference}: {_missed(outcome, args.max_triangles, args.output)}")
         elif outputs:
             try:
-                warnings += save_version(args.reference, outcome.last.best.version, outputs[number], reading)
+                with stops_wait():
+                    warnings += save_version(args.reference, outcome.last.best.version, outputs[number], reading)
                 saved[number] = outputs[number]
             except FMQMError as error:
                 errors.append(str(error))

@@ -9,9 +9,9 @@ blender -b -q --python scripts/score.py -- REFERENCE DISTORTED [DISTORTED ...]
 from __future__ import annotations
 
 import argparse
-import contextlib
+import functools
+import hashlib
 import os
-import shutil
 import sys
 import tempfile
 from collections import Counter
@@ -26,14 +26,25 @@ from fmqm_addon.batch.cluster import score_on_cluster
 from fmqm_addon.batch.journal import Journal, Records, row_key
 from fmqm_addon.batch.manifest import glob_files, lod_rows, plain_rows, read_manifest
 from fmqm_addon.batch.merge import Merged
-from fmqm_addon.batch.progress_log import Log
+from fmqm_addon.batch.progress_log import Log, tell
 from fmqm_addon.batch.rows import Options, Row, Task
 from fmqm_addon.batch.scorer import score_tasks, units_of, work_off
 from fmqm_addon.batch.workers import Limits, adopt, score_with_workers, workers_command
 from fmqm_addon.blender.access import Access
 from fmqm_addon.blender.materials.types import MAX_BAKE
-from fmqm_addon.cli.process import FAILED, OK, WRONG_ARGUMENTS, blender_version, machine_memory, require_bpy, run_script
+from fmqm_addon.cli.process import (
+    FAILED,
+    OK,
+    WORKER,
+    WRONG_ARGUMENTS,
+    blender_version,
+    machine_memory,
+    prepare_bpy,
+    run_script,
+)
+from fmqm_addon.cli.stops import stops_wait
 from fmqm_addon.comparison.alignment import SPACES
+from fmqm_addon.folders import TEMPORARY, own_folder, sweep
 from fmqm_addon.metric.errors import FileError, FMQMError, SettingsError
 from fmqm_addon.metric.settings import CENTERS, COLOR_SPACES, POOLINGS, PRESETS, SETTING_NAMES, Settings
 from fmqm_addon.report.atomic_files import STDOUT, check_apart, check_writable, print_parts, write_parts
@@ -48,6 +59,7 @@ if TYPE_CHECKING:
 
 PROGRAM = "score.py"
 _STRANGERS = 600.0  # seconds that a pair of strangers' files may take
+_LONGEST_NAME = 255  # bytes, where file systems are common
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -89,7 +101,9 @@ def build_parser() -> OneLineParser:
     batch.add_argument(
         "--lods", metavar="FILE", help="score each level of the file's LOD chains against level 0 and the level before"
     )
-    batch.add_argument("--jobs", type=int, metavar="N", help="score in N watched processes")
+    batch.add_argument(
+        "--jobs", type=int, metavar="N", help="score in N watched processes (default: 1 for more than one pair)"
+    )
     batch.add_argument(
         "--timeout", type=float, metavar="SECONDS", help="a worker may take so long for a pair (default: 3600)"
     )
@@ -197,8 +211,6 @@ def _watched(args: argparse.Namespace) -> Limits:
     memory = args.memory_limit and args.memory_limit * 1e9
     if not args.untrusted:
         return Limits(args.timeout or Limits.timeout, memory)
-    if not (args.jobs or args.dask or args.worker or args.merge):
-        args.jobs = 1
     total = machine_memory()
     return Limits(args.timeout or _STRANGERS, memory or (total and 0.75 * total))
 
@@ -230,8 +242,10 @@ def main(argv: Sequence[str], out: TextIO) -> int:
         limits = _watched(args)
         _check_arguments(args)
         options.settings.with_seed(options.settings.seed + args.repeats - 1)
+        if WORKER in os.environ and not args.worker:
+            raise FMQMError("a worker without a shard; this is a fault of the program")
         if args.worker:
-            require_bpy()
+            prepare_bpy()
             work_off(args.worker, options, limits.timeout)
             return OK
         rows = _rows(args, options)
@@ -249,7 +263,7 @@ def main(argv: Sequence[str], out: TextIO) -> int:
     except SettingsError as error:
         parser.error(str(error))
     except FMQMError as error:
-        print(f"{PROGRAM}: {error}", file=sys.stderr)
+        tell(f"{PROGRAM}: {error}\n")
         return FAILED
 
 
@@ -279,9 +293,6 @@ def _check_arguments(args: argparse.Namespace) -> None:
         value = getattr(args, flag)
         if value is not None and not (value >= 1 if least else 0 < value < float("inf")):
             raise SettingsError(f"{_flag(flag)} is {value}; it must be {'at least 1' if least else 'above 0'}")
-    for flag in ("timeout", "memory_limit"):
-        if getattr(args, flag) is not None and not (args.jobs or args.dask):
-            raise SettingsError(f"{_flag(flag)} is for workers; give --jobs too")
     if args.dask and args.report and not os.path.isabs(args.report):
         raise SettingsError(f"--report {args.report}: with --dask name a folder that all hosts share, from its root on")
     if args.jobs and args.dask:
@@ -299,7 +310,7 @@ def _check_arguments(args: argparse.Namespace) -> None:
             continue
         if len(args.distorted) != 1:
             raise SettingsError(f"{_flag(flag)} takes exactly one DISTORTED; {len(args.distorted)} are given")
-        if args.jobs or args.dask or args.resume or args.shard or args.untrusted:
+        if args.jobs or args.dask or args.resume or args.shard or args.timeout or args.memory_limit or args.untrusted:
             raise SettingsError(f"{_flag(flag)} is of a pair that this process scores; leave out the batch's flags")
 
 
@@ -335,8 +346,9 @@ def _rows(args: argparse.Namespace, options: Options) -> list[Row] | None:
     if args.manifest:
         rows = read_manifest(args.manifest, options.settings)
     elif args.lods:
-        require_bpy()
-        rows = lod_rows(args.lods, Access(options.untrusted, options.asset_root))
+        prepare_bpy()
+        with stops_wait():
+            rows = lod_rows(args.lods, Access(options.untrusted, options.asset_root))
     elif args.reference:
         names = glob_files(args.reference, args.glob) if args.glob else args.distorted
         rows = plain_rows(args.reference, names, args.ref_texture or "", args.texture)
@@ -364,7 +376,17 @@ def _journal_path(args: argparse.Namespace) -> str | None:
     if args.journal:
         return str(args.journal)
     first = next((path for path in (args.json, args.csv, args.junit) if path and path != STDOUT), None)
-    return f"{first}.journal.jsonl" if first else None
+    if first is None:
+        return None
+    folder, name = os.path.split(first)
+    ending = ".journal.jsonl"
+    if len(os.fsencode(name + ending)) > _LONGEST_NAME:
+        name = f"{name[:40]}-{_digest(name)}"
+    return os.path.join(folder, name + ending)
+
+
+def _digest(name: str) -> str:
+    return hashlib.blake2b(os.fsencode(name), digest_size=4).hexdigest()
 
 
 def _merge(args: argparse.Namespace, rows: list[Row] | None, out: TextIO) -> int:
@@ -381,66 +403,43 @@ def _score(
     keys = [row_key(row, options, versions) for row in rows]
     path = _journal_path(args)
     journal = Journal(path, args.resume)
+    folder = os.path.dirname(path) if path else tempfile.gettempdir()
+    kind = f"workers-{_digest(os.path.basename(path))}" if path else TEMPORARY
+    if path:  # what a run of this journal that was killed has left
+        sweep(folder, kind, functools.partial(adopt, journal=journal) if args.resume else None)
+    waiting = {
+        key: Task(key, row)
+        for key, row in zip(keys, rows, strict=True)
+        if not journal.has_scores(key) or not has_pictures(args.report, journal.record(key))
+    }
+    tasks = list(waiting.values())
+    # A pair that ends its process, as some files do, shall be an error of its own.
+    asked = args.jobs or args.timeout or args.memory_limit or args.untrusted
+    use_workers = bool(asked or len(rows) > 1 or any(journal.was_begun(task.key) for task in tasks))
     last = None
-    with _folder_of_workers(path) as folder:
-        if args.resume:
-            adopt(folder, journal)
-        elif path:  # what a run that was killed has left
-            shutil.rmtree(folder, ignore_errors=True)
-        waiting = {
-            key: Task(key, row)
-            for key, row in zip(keys, rows, strict=True)
-            if not journal.has_scores(key) or not has_pictures(args.report, journal.record(key))
-        }
-        tasks = list(waiting.values())
-        try:
-            last = _score_tasks(args, tasks, options, limits, argv, journal, folder)
-        except KeyboardInterrupt:
-            if path:
-                print(f"{PROGRAM}: interrupted; --resume goes on where {path} ends", file=sys.stderr)
-            raise
+    try:
+        if args.dask:
+            score_on_cluster(tasks, args.dask, argv, limits, journal, Log(PROGRAM, len(tasks), len(tasks), args.quiet))
+        elif use_workers:
+            with own_folder(folder, kind) as place:
+                log = Log(PROGRAM, len(tasks), len(tasks), args.quiet)
+                command = workers_command(str(Path(__file__).resolve()), argv)
+                score_with_workers(tasks, command, place, args.jobs or 1, limits, journal, log)
+        elif tasks:
+            prepare_bpy()
+            last = score_tasks(tasks, options, journal, Log(PROGRAM, units_of(tasks), len(tasks), args.quiet))
+    except KeyboardInterrupt:
+        if path:
+            tell(f"{PROGRAM}: interrupted; --resume goes on where {path} ends\n")
+        raise
+    except OSError as error:
+        raise FileError(f"{folder or os.curdir}: workers need a folder here ({error.strerror or error})") from error
     records = Records(rows, keys, journal, args.fail_under)
     _write(args, records, options.as_dict(), versions, last, out)
     code = _exit_code(records)
     batch = args.manifest or args.glob or args.lods or args.jobs or args.dask or args.journal or args.resume
     journal.close() if batch else journal.remove()
     return code
-
-
-def _score_tasks(
-    args: argparse.Namespace,
-    tasks: list[Task],
-    options: Options,
-    limits: Limits,
-    argv: Sequence[str],
-    journal: Journal,
-    folder: Path,
-) -> Answer | None:
-    """On the cluster, by workers, or here: then what came of the last pair."""
-    if args.dask:
-        score_on_cluster(tasks, args.dask, argv, limits, journal, Log(PROGRAM, len(tasks), len(tasks), args.quiet))
-    elif args.jobs:
-        log = Log(PROGRAM, len(tasks), len(tasks), args.quiet)
-        command = workers_command(str(Path(__file__).resolve()), argv)
-        score_with_workers(tasks, command, folder, args.jobs, limits, journal, log)
-    elif tasks:
-        require_bpy()
-        log = Log(PROGRAM, units_of(tasks), len(tasks), args.quiet)
-        return score_tasks(tasks, options, journal, log)
-    return None
-
-
-@contextlib.contextmanager
-def _folder_of_workers(journal: str | None) -> Iterator[Path]:
-    """Beside the journal, so that a run that was killed leaves it to the next one."""
-    try:
-        folder = Path(f"{journal}.workers" if journal else tempfile.mkdtemp(prefix="fmqm-"))
-    except OSError as error:
-        raise FileError(f"{tempfile.gettempdir()}: no folder can be made ({error.strerror or error})") from error
-    try:
-        yield folder
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _write(

@@ -61,6 +61,7 @@ class Journal:
         self.path = path
         self._offsets: dict[str, int] = {}
         self._failed: set[str] = set()
+        self._begun: set[str] = set()
         try:
             self._file: IO[bytes] = open(path, "ab+", 0) if path else tempfile.TemporaryFile(buffering=0)  # noqa: SIM115
             _lock(self._file, path)
@@ -80,8 +81,13 @@ class Journal:
         """Whether there is a record to stand by: the cause of an error may have been repaired."""
         return key in self._offsets and key not in self._failed
 
+    def was_begun(self, key: str) -> bool:
+        """Whether the pair was begun and never recorded: an earlier run was stopped there, or the pair ended it."""
+        return key in self._begun
+
     def start(self, key: str) -> None:
         self._append({"start": key})
+        self._begun.add(key)
 
     def done(self, key: str, record: Mapping[str, Any]) -> None:
         self._note(key, self._append({"done": key, "pair": record}), record)
@@ -118,6 +124,8 @@ class Journal:
                 event = parse_line(line)
                 if "done" in event:
                     self._note(event["done"], offset, event["pair"])
+                elif "start" in event:
+                    self._begun.add(event["start"])
                 offset += len(line)
 
     def _reader(self, offset: int = 0) -> IO[bytes]:
@@ -126,6 +134,7 @@ class Journal:
 
     def _note(self, key: str, offset: int, record: Mapping[str, Any]) -> None:
         self._offsets[key] = offset
+        self._begun.discard(key)
         if record["error"] is None:
             self._failed.discard(key)
         else:
@@ -147,8 +156,9 @@ class Journal:
         return begin
 
     def _cannot_be_written(self, error: OSError) -> FileError:
-        where = self.path or tempfile.gettempdir()
-        return FileError(f"{where}: the journal cannot be written ({error.strerror or error})")
+        if not self.path:
+            return FileError(f"there is no place for temporary files ({error.strerror or error}); set TMPDIR")
+        return FileError(f"{self.path}: the journal cannot be written ({error.strerror or error})")
 
 
 def _lock(file: IO[bytes], path: str | None) -> None:

@@ -40,7 +40,7 @@ class Log:
             return
         self._percent = percent
         line = f"{percent:3d} %  {one_line(text)}{self._rate()}"
-        _print(f"\r\x1b[K{line}" if self._moving else f"{line}\n")
+        tell(f"\r\x1b[K{line}" if self._moving else f"{line}\n")
 
     def scored(self, record: Mapping[str, Any]) -> None:
         """Counts a pair that was scored elsewhere as a unit."""
@@ -60,7 +60,7 @@ class Log:
             text = f"{name}: {text}"
         if not self._silent:
             self.end()
-            _print(f"{self._program}: {kind}{one_line(text)}\n")
+            tell(f"{self._program}: {kind}{one_line(text)}\n")
 
     def note(self, text: str) -> None:
         """What is good to know, but no error."""
@@ -70,7 +70,7 @@ class Log:
     def end(self) -> None:
         """Clears the moving line."""
         if self._moving and not self._quiet:
-            _print("\r\x1b[K")
+            tell("\r\x1b[K")
 
     def _rate(self) -> str:
         spent = time.monotonic() - self._began
@@ -80,7 +80,8 @@ class Log:
         return f"; {self.finished} of {self._pairs}, {_pace(self.finished / spent)}, {_duration(left)} left"
 
 
-def _print(text: str) -> None:
+def tell(text: str) -> None:
+    """Prints to stderr."""
     with contextlib.suppress(FileError):  # the work goes on though nobody can be told
         print_parts(sys.stderr, [text])
 

@@ -10,15 +10,23 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from ..cli.process import stops_wait
-from ..metric.errors import FMQMError, ImageMissingError, ImageSizeError, OutputError, OutsideError, one_line
+from ..cli.stops import stops_wait
+from ..metric.errors import (
+    FileError,
+    FMQMError,
+    ImageMissingError,
+    ImageSizeError,
+    OutputError,
+    OutsideError,
+    one_line,
+)
 from ..report.explain import explain, where
 from ..report.html.pictures import picture_stem, write_pair_pictures
 from ..report.records import PairScore, pair_record
 from .journal import Journal
-from .progress_log import Log
+from .progress_log import Log, tell
 from .rows import Options, Row, Task, grouped, task_of
-from .workers import end_when_stuck, end_with_parent, journal_of
+from .workers import NOTE, end_when_stuck, end_with_parent, journal_of
 
 if TYPE_CHECKING:
     from ..blender.materials.types import Reading
@@ -57,13 +65,27 @@ def units_of(tasks: Sequence[Task]) -> int:
 
 
 def work_off(shard: str, options: Options, stuck_after: float) -> None:
-    """What a worker does: scores the tasks of a shard into the journal beside it, as long as its parent lives."""
+    """What a worker does: scores the tasks of a shard into the journal beside it, as long as its parent lives.
+
+    Raises:
+        FileError: there is no such shard.
+    """
+    try:
+        tasks = [task_of(plain) for plain in json.loads(Path(shard).read_text(encoding="utf-8"))]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise FileError(f"{shard}: no shard for a worker ({getattr(error, 'strerror', None) or error})") from error
     end_with_parent()
-    tasks = [task_of(plain) for plain in json.loads(Path(shard).read_text(encoding="utf-8"))]
     journal = Journal(journal_of(shard))
-    silent = Log("", units_of(tasks), len(tasks), silent=True)
-    score_tasks(tasks, options, journal, silent, lambda: end_when_stuck(stuck_after))
+    log = _WorkersLog("", units_of(tasks), len(tasks), silent=True)
+    score_tasks(tasks, options, journal, log, lambda: end_when_stuck(stuck_after))
     journal.close()
+
+
+class _WorkersLog(Log):
+    """Only notes, which the parent reads and passes on; it sees the rest in the journal."""
+
+    def note(self, text: str) -> None:
+        tell(f"{NOTE}{one_line(text)}\n")
 
 
 class _Scorer:

@@ -11,24 +11,25 @@ import faulthandler
 import json
 import math
 import os
-import shutil
 import signal
 import subprocess
 import sys
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..cli.process import stops_wait
+from ..cli.process import TEMPORARY_PLACES, WORKER
+from ..cli.stops import stops_wait
 from ..metric.errors import FileError, FMQMError
 from .journal import Journal, parse_line
 from .progress_log import Log
 from .rows import Task, grouped
 
+NOTE = "note: "  # begins a line that a worker prints for this process's log
 TRIES = 2  # a pair that ends its worker is tried once more
 _POLL = 0.1  # seconds between looks at the workers
 _WORTHWHILE = 5.0  # seconds of work that a worker is started for, at least
@@ -36,6 +37,8 @@ _BARREN = 3  # workers in a row that end before their first pair: it is not the 
 _STARTING = 120.0  # seconds that a worker has to begin its first pair: a busy machine is not the pair's fault
 _GRACE = 30.0  # seconds after its time-out until a stuck worker ends itself, should nobody do it
 _LONGEST = 1e8  # seconds, three years; faulthandler takes no more than its clock can count
+
+Command = Callable[[str], Sequence[str]]  # the command line of a worker, for the path of its shard
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,7 @@ def journal_of(shard: str) -> str:
 
 def score_with_workers(
     tasks: Sequence[Task],
-    command: Sequence[str],
+    command: Command,
     folder: Path,
     jobs: int,
     limits: Limits,
@@ -63,14 +66,17 @@ def score_with_workers(
     """Scores all tasks into the journal.
 
     Args:
-        command: a worker's, to which the path of a shard is added.
+        command: a worker's.
         folder: for shards and the workers' journals and temporary files.
         log: counts the pairs.
         cwd: the workers' working directory; None is that of this process.
 
     Raises:
-        FMQMError: workers end before they score anything, cannot be started, or their memory cannot be watched.
+        FMQMError: workers end before they score anything, cannot be started, or their memory cannot be watched; or
+            this process is a worker itself.
     """
+    if WORKER in os.environ:
+        raise FMQMError("a worker starts no workers; this is a fault of the program")
     if limits.memory is not None and resident_bytes(os.getpid()) is None:
         raise FMQMError("--memory-limit: neither /proc nor ps tells the memory of a process here; leave it out")
     pool = _Pool(tasks, command, folder, limits, journal, log, cwd)
@@ -85,12 +91,13 @@ def score_with_workers(
 
 
 def adopt(folder: Path, journal: Journal) -> None:
-    """Takes over the scores of workers whose parent was killed before it read them, and removes their folder."""
+    """Takes over the scores of workers whose parent was killed before it read them, and which pairs they were at."""
     for path in sorted(folder.glob("shard-*.jsonl")):
         for event in map(parse_line, path.read_bytes().splitlines()):
-            if "done" in event and event["pair"]["error"] is None and not journal.has_scores(event["done"]):
+            if "start" in event and not journal.has_scores(event["start"]):
+                journal.start(event["start"])
+            elif "done" in event and event["pair"]["error"] is None and not journal.has_scores(event["done"]):
                 journal.done(event["done"], event["pair"])
-    shutil.rmtree(folder, ignore_errors=True)
 
 
 class _Pool:
@@ -99,14 +106,17 @@ class _Pool:
     def __init__(
         self,
         tasks: Sequence[Task],
-        command: Sequence[str],
+        command: Command,
         folder: Path,
         limits: Limits,
         journal: Journal,
         log: Log,
         cwd: str | None,
     ) -> None:
-        self.waiting = deque(task for group in grouped(tasks) for task in group)
+        # Last, what an earlier run began and did not end: it may have been what ended that run.
+        fresh = [task for task in tasks if not journal.was_begun(task.key)]
+        begun = [task for task in tasks if journal.was_begun(task.key)]
+        self.waiting = deque(task for part in (fresh, begun) for group in grouped(part) for task in group)
         self.workers: list[_Worker] = []
         self._command = command
         self._folder = folder
@@ -116,6 +126,7 @@ class _Pool:
         self._cwd = cwd
         self._failed: Counter[str] = Counter()  # tries, by key
         self._began = time.monotonic()
+        self._noted: set[str] = set()
         self._started = 0  # workers
         self._barren = 0  # workers in a row that scored nothing
 
@@ -143,6 +154,8 @@ class _Pool:
 
     def _share(self, jobs: int) -> int:
         """Much at first, less towards the end, so that all finish together; but worth the start of a worker."""
+        if jobs == 1:
+            return len(self.waiting)
         fair = len(self.waiting) / (jobs - len(self.workers))
         if not self._log.finished:
             return math.ceil(fair * 0.75)
@@ -150,6 +163,10 @@ class _Pool:
         return min(len(self.waiting), math.ceil(max(len(self.waiting) / jobs / 2, _WORTHWHILE / seconds)))
 
     def _take_news(self, worker: _Worker) -> None:
+        for note in worker.notes():
+            if note not in self._noted:  # each worker that prepares a reference has the same to say
+                self._noted.add(note)
+                self._log.note(note)
         for event in worker.news():
             if "start" in event:
                 self._journal.start(event["start"])
@@ -192,27 +209,25 @@ class _Worker:
         tasks: those it has not done, by key. at: key of the one it is at, "" before the first and between two.
     """
 
-    def __init__(self, command: Sequence[str], shard: Path, tasks: Sequence[Task], cwd: str | None) -> None:
+    def __init__(self, command: Command, shard: Path, tasks: Sequence[Task], cwd: str | None) -> None:
         self.tasks = {task.key: task for task in tasks}
         self.at = ""
         self._shard = shard
-        self._read = 0  # bytes of its journal
+        self._log = shard.with_suffix(".log")
+        self._read = self._read_log = 0  # bytes of its journal, and of what it has printed
         self._heard, self._begun = time.monotonic(), False
         try:
-            shard.parent.mkdir(exist_ok=True)
-            # A run that was killed may have left one of the same name, which would be read as this worker's.
-            Path(journal_of(str(shard))).unlink(missing_ok=True)
             shard.write_text(json.dumps([task.as_dict() for task in tasks]), encoding="utf-8")
-            with open(shard.with_suffix(".log"), "wb") as log:
+            with open(self._log, "wb") as log:
                 # Its input is a pipe that nothing is written to: it closes when this process ends, however it does.
                 # In a session of its own, Ctrl-C reaches only this process, which ends it.
                 self._process = subprocess.Popen(
-                    [*command, str(shard)],
+                    command(str(shard)),
                     stdin=subprocess.PIPE,
                     stdout=subprocess.DEVNULL,
                     stderr=log,
                     cwd=cwd,
-                    env=os.environ | dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(shard.parent.resolve())),
+                    env=os.environ | dict.fromkeys(TEMPORARY_PLACES, str(shard.parent.resolve())) | {WORKER: "1"},
                     start_new_session=True,
                 )
         except OSError as error:
@@ -237,13 +252,7 @@ class _Worker:
 
     def news(self) -> list[dict[str, Any]]:
         """The events that its journal tells since the last time; a line that is still being written comes later."""
-        try:
-            with open(journal_of(str(self._shard)), "rb") as file:
-                file.seek(self._read)
-                written = file.read()
-        except FileNotFoundError:
-            return []
-        whole = written[: written.rfind(b"\n") + 1]
+        whole = _whole_lines(Path(journal_of(str(self._shard))), self._read)
         self._read += len(whole)
         events = [parse_line(line) for line in whole.splitlines()]
         for event in events:
@@ -251,6 +260,13 @@ class _Worker:
             self.at = event.get("start", "")
             self.tasks.pop(event.get("done", ""), None)
         return events
+
+    def notes(self) -> list[str]:
+        """What it has noted since the last time."""
+        whole = _whole_lines(self._log, self._read_log)
+        self._read_log += len(whole)
+        lines = whole.decode("utf-8", "replace").split("\n")
+        return [line.removeprefix(NOTE) for line in lines if line.startswith(NOTE)]
 
     def end(self) -> None:
         """Kills it if it lives, and waits for its end."""
@@ -262,13 +278,31 @@ class _Worker:
     def farewell(self) -> str:
         """How it ended by itself, and what it said last."""
         code = self._process.returncode
-        how = f"ended with exit code {code}" if code >= 0 else f"died ({signal.Signals(-code).name})"
+        how = f"ended with exit code {code}" if code >= 0 else f"died ({_signal_name(-code)})"
         words = self.last_words()
         return f"its worker {how}{f', saying: {words}' if words else ''}"
 
     def last_words(self) -> str:
-        lines = self._shard.with_suffix(".log").read_text(encoding="utf-8", errors="replace").split("\n")
+        lines = self._log.read_text(encoding="utf-8", errors="replace").split("\n")
         return next((line.strip() for line in reversed(lines) if line.strip()), "")
+
+
+def _whole_lines(path: Path, begin: int) -> bytes:
+    """What a file holds from there on, but for a line that is still being written."""
+    try:
+        with open(path, "rb") as file:
+            file.seek(begin)
+            written = file.read()
+    except FileNotFoundError:
+        return b""
+    return written[: written.rfind(b"\n") + 1]
+
+
+def _signal_name(number: int) -> str:
+    try:
+        return signal.Signals(number).name
+    except ValueError:  # real-time signals have none
+        return f"signal {number}"
 
 
 def resident_bytes(pid: int) -> int | None:
@@ -301,9 +335,12 @@ def end_when_stuck(timeout: float) -> None:
     faulthandler.dump_traceback_later(min(timeout + _GRACE, _LONGEST), exit=True, file=2)
 
 
-def workers_command(script: str, arguments: Sequence[str]) -> list[str]:
-    """This program once more: under Blender if we are, else in this Python. A shard's path follows --worker."""
+def workers_command(script: str, arguments: Sequence[str]) -> Command:
+    """This program once more: under Blender if we are, else in this Python.
+
+    A worker's own arguments come first: after a -- among the others they would be names of files.
+    """
     blender = sys.modules.get("bpy")
     program = blender.app.binary_path if blender is not None else ""
     start = [program, "-b", "-q", "--python", script, "--"] if program else [sys.executable, script]
-    return [*start, *arguments, "--worker"]
+    return lambda shard: [*start, "--worker", shard, *arguments]

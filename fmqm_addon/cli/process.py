@@ -3,22 +3,50 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import importlib
 import importlib.metadata
 import os
-import signal
 import sys
+import tempfile
 import traceback
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NoReturn, TextIO
 
+from ..folders import keep_folder, remove_all
 from ..metric.errors import FMQMError
+from .stops import INTERRUPTED, kill_if_deaf, stop_on_signals, stopped, stops_wait
 
-OK, FAILED, WRONG_ARGUMENTS, INTERRUPTED = 0, 1, 2, 130  # exit codes
+OK, FAILED, WRONG_ARGUMENTS = 0, 1, 2  # exit codes, and INTERRUPTED
+WORKER = "FMQM_WORKER"  # set in the environment of workers
+TEMPORARY_PLACES = ("TMPDIR", "TEMP", "TMP")  # of them Python and Blender take one
 SYSTEM_PACKAGES = "libx11-6 libxrender1 libxxf86vm1 libxfixes3 libxi6 libxkbcommon0 libsm6 libice6 libgl1 libegl1"
+
+
+def prepare_bpy() -> None:
+    """Imports bpy into the process of a script: a stop ends it in any case, and nothing of it stays behind for long.
+
+    Raises:
+        FMQMError: as require_bpy; or there is no place for temporary files.
+    """
+    if WORKER not in os.environ:  # whose parent sees to both
+        kill_if_deaf()
+        if "bpy" not in sys.modules:
+            _own_temporary_files()
+    require_bpy()
+
+
+def _own_temporary_files() -> None:
+    """Lets all temporary files of this process, Blender's too, go to a folder that a later run sweeps if we crash."""
+    try:
+        folder = str(keep_folder())
+    except OSError as error:
+        raise FMQMError(f"there is no place for temporary files ({error.strerror or error}); set TMPDIR") from error
+    atexit.register(remove_all)  # before Blender's own, which runs first then
+    os.environ |= dict.fromkeys(TEMPORARY_PLACES, folder)
+    tempfile.tempdir = folder
 
 
 def require_bpy() -> None:
@@ -28,7 +56,8 @@ def require_bpy() -> None:
         FMQMError: it cannot be imported; the text says what to install.
     """
     try:
-        importlib.import_module("bpy")
+        with stops_wait():  # Blender's scripts start with it, and go on without what was stopped
+            importlib.import_module("bpy")
     except ModuleNotFoundError as error:
         raise FMQMError(
             "this Python has no bpy: run `make demo` once and use .venv/bin/python, or run under Blender itself: "
@@ -53,48 +82,6 @@ def blender_version() -> str:
     return ".".join(map(str, sys.modules["bpy"].app.version))
 
 
-def stop_on_signals() -> None:
-    """Makes a build server's stop the same as Ctrl-C, also under Blender, which sets its own handlers."""
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, _stop)
-
-
-@contextlib.contextmanager
-def stops_wait() -> Iterator[None]:
-    """Holds a stop back where it would be lost or do harm: Python that Blender runs while it opens a file swallows it.
-
-    A second stop is not held back.
-
-    Raises:
-        KeyboardInterrupt: at the end, if there was one.
-    """
-    _stops.wait = True
-    try:
-        yield
-    finally:
-        _stops.wait = False
-    if _stops.came:
-        raise KeyboardInterrupt
-
-
-@dataclass
-class _Stops:
-    """Handlers of signals run between two lines of the same thread: plain values do."""
-
-    wait: bool = False
-    came: bool = False
-
-
-_stops = _Stops()
-
-
-def _stop(number: int, frame: object) -> None:
-    waits = _stops.wait and not _stops.came
-    _stops.came = True
-    if not waits:
-        raise KeyboardInterrupt
-
-
 def run_script(main: Callable[[Sequence[str], TextIO], int], script: str) -> NoReturn:
     """Ends the process with the exit code of main, which gets arguments and standard output.
 
@@ -104,14 +91,26 @@ def run_script(main: Callable[[Sequence[str], TextIO], int], script: str) -> NoR
     argv = sys.argv[1:]
     if os.path.basename(sys.argv[0]) != os.path.basename(script):
         argv = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
+    _open_streams()
     stop_on_signals()
+    out = take_stdout()
     try:
-        code = main(argv, take_stdout())
+        os.getcwd()
+        code = main(argv, out)
+        if stopped():
+            code = INTERRUPTED
     except KeyboardInterrupt:
         code = INTERRUPTED
-    except Exception:
-        traceback.print_exc()  # Blender would do the same, go on and end with 0
+    except Exception as error:
         code = FAILED
+        with contextlib.suppress(OSError):
+            if isinstance(error, OSError) and not _has_working_folder():
+                sys.stderr.write(f"{os.path.basename(script)}: the working folder is gone; change to another\n")
+            else:
+                traceback.print_exc()  # Blender would do the same, go on and end with 0
+    finally:
+        _let_go(out)
+        _let_go(sys.stderr)
     sys.exit(code)
 
 
@@ -129,14 +128,45 @@ def machine_memory() -> int | None:
     return found
 
 
+def _has_working_folder() -> bool:
+    try:
+        return bool(os.getcwd())
+    except OSError:
+        return False
+
+
+def _let_go(stream: TextIO) -> None:
+    """Prints what is left, if anybody reads it; else Python would complain of it when it ends."""
+    try:
+        stream.flush()
+    except (OSError, ValueError):
+        with contextlib.suppress(OSError, ValueError):
+            _lead_nowhere(stream.fileno())
+
+
+def _open_streams() -> None:
+    """Streams that were closed lead nowhere: no file shall get their numbers, which C code prints to."""
+    while (number := os.open(os.devnull, os.O_RDWR)) <= 2:
+        pass
+    os.close(number)
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
+
+
+def _lead_nowhere(number: int) -> None:
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, number)
+    os.close(nowhere)
+
+
 def take_stdout() -> TextIO:
     """Standard output for this script alone.
 
     Importers print to it from C, some of it only when the process ends: from here on that goes nowhere.
     """
-    sys.stdout.flush()
+    with contextlib.suppress(OSError):
+        sys.stdout.flush()
     out = open(os.dup(1), "w", encoding="utf-8", errors="backslashreplace", newline="")  # noqa: SIM115
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 1)
-    os.close(nowhere)
+    _lead_nowhere(1)
     return out

@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
+import errno
 import os
-import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TextIO
 
+from ..folders import own_folder, take_place
 from ..metric.errors import FileError, SettingsError
 
 STDOUT = "-"  # in the place of a path
@@ -17,27 +18,22 @@ STDOUT = "-"  # in the place of a path
 
 @contextmanager
 def replaced(path: str) -> Iterator[str]:
-    """A temporary path beside the file, which takes the file's place once it has been written; links stay links.
+    """A temporary path of the same ending, whose file takes the file's place once it has been written.
+
+    Links stay links, and a file that is replaced keeps its mode.
 
     Raises:
         FileError: it cannot be written; what stood there is left as it was.
     """
     check_writable(path)
-    target = Path(os.path.realpath(path))
-    temporary = ""
     try:
-        handle, temporary = tempfile.mkstemp(suffix=target.suffix, prefix=f".{target.name}.", dir=target.parent)
-        os.close(handle)
-        yield temporary
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(temporary, 0o666 & ~umask)
-        os.replace(temporary, target)
+        target = Path(os.path.realpath(path))
+        with own_folder(target.parent) as folder:  # in it any name fits: the file's own may be as long as names can be
+            temporary = folder / f"file{target.suffix}"
+            yield str(temporary)
+            take_place(temporary, target)
     except OSError as error:
         raise FileError(f"{path}: cannot be written ({error.strerror or error})") from error
-    finally:
-        if temporary and os.path.exists(temporary):
-            os.remove(temporary)
 
 
 def write_text(path: str, text: str) -> None:
@@ -54,7 +50,8 @@ def write_parts(path: str, parts: Iterable[str]) -> None:
 
 
 def print_parts(stream: TextIO, parts: Iterable[str]) -> None:
-    """Prints, and sees to it that it arrives. A pipe that nobody reads any more, such as that of head, is no error.
+    """Prints, and sees to it that it arrives. A pipe that nobody reads any more, such as that of head, is no error,
+    nor is a stream that was closed before Blender started, whose number may stand for anything then.
 
     Raises:
         FileError: it cannot be written, as where a disk is full.
@@ -66,7 +63,7 @@ def print_parts(stream: TextIO, parts: Iterable[str]) -> None:
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, stream.fileno())  # what is still buffered must not fail again when the stream closes
         os.close(nowhere)
-        if not isinstance(error, BrokenPipeError):
+        if error.errno not in (errno.EPIPE, errno.EBADF):
             raise FileError(f"the output cannot be printed ({error.strerror or error})") from error
 
 
@@ -100,8 +97,14 @@ def check_writable(path: str) -> None:
     """Says early, before minutes of work, that an output cannot be written.
 
     Raises:
-        FileError: its folder is missing or read-only, or it is a folder, a device or a pipe.
+        FileError: its folder is missing or read-only, its name is too long, or it is a folder, a device or a pipe.
     """
+    try:
+        os.lstat(path)
+    except (FileNotFoundError, NotADirectoryError):
+        pass
+    except OSError as error:
+        raise FileError(f"{path}: cannot be written ({error.strerror or error}); name another file") from error
     folder = Path(path).parent if not os.path.islink(path) else Path(os.path.realpath(path)).parent
     if not folder.is_dir():
         raise FileError(f"{path}: the folder {folder} does not exist; make it first")

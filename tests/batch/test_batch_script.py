@@ -349,7 +349,7 @@ MISSING = ("none.csv: cannot be read", "no file matches")  # files, which are no
         (("--glob", "*.obj"), "REFERENCE"),
         (("ref.obj", "--glob", "*.fbx"), "no file matches"),
         (("ref.obj", "a.obj", "--jobs", "0"), "--jobs is 0"),
-        (("ref.obj", "a.obj", "--timeout", "5"), "--timeout is for workers"),
+        (("ref.obj", "a.obj", "--timeout", "5", "--picture", "p.png"), "leave out the batch's flags"),
         (("ref.obj", "a.obj", "--jobs", "1", "--memory-limit", "nan"), "--memory-limit is nan"),
         (("ref.obj", "a.obj", "--shard", "3/2"), "--shard is 3/2"),
         (("ref.obj", "a.obj", "--resume"), "--resume needs"),

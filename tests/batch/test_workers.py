@@ -18,7 +18,8 @@ from fmqm_addon.batch import workers
 from fmqm_addon.batch.journal import Journal, parse_line
 from fmqm_addon.batch.progress_log import Log
 from fmqm_addon.batch.rows import Row, Task
-from fmqm_addon.batch.workers import Limits, adopt, journal_of, score_with_workers
+from fmqm_addon.batch.workers import Command, Limits, adopt, journal_of, score_with_workers, workers_command
+from fmqm_addon.cli.process import WORKER
 from fmqm_addon.metric.errors import FileError, FMQMError
 from fmqm_addon.report.records import PairScore, pair_record
 
@@ -37,9 +38,12 @@ def record(name: str, score: float | None) -> dict[str, Any]:
 def watch(folder: Path, tasks: list[Task], jobs: int = 2, limits: Limits | None = None, told: str = "") -> Journal:
     journal = Journal(str(folder / "journal"))
     log = Log("", len(tasks), len(tasks), silent=True)
-    command = [sys.executable, str(FAKE), told or str(folder)]
-    score_with_workers(tasks, command, folder, jobs, limits or Limits(), journal, log)
+    score_with_workers(tasks, fake(folder, told), folder, jobs, limits or Limits(), journal, log)
     return journal
+
+
+def fake(folder: Path, told: str = "") -> Command:
+    return lambda shard: [sys.executable, str(FAKE), told or str(folder), shard]
 
 
 def alive(folder: Path) -> list[int]:
@@ -65,6 +69,7 @@ def test_each_pair_is_scored_once_by_as_many_workers_as_there_are_jobs(tmp_path:
     ("name", "limits", "words"),
     [
         ("die", Limits(), "its worker died (SIGKILL), 2 times"),
+        ("realtime", Limits(), "its worker died (signal 40), 2 times"),
         ("quit", Limits(), "its worker ended with exit code 1, saying: no memory here, 2 times"),
         ("hang", Limits(timeout=3), "not scored within 3 s (--timeout), 2 times"),
         ("swell", Limits(memory=2e8), "scoring it takes more than 0.2 GB of memory (--memory-limit), 2 times"),
@@ -86,14 +91,36 @@ def test_a_pair_that_fails_once_is_tried_once_more(tmp_path: Path) -> None:
     assert all(journal.record(f"k{number}")["error"] is None for number in range(3))
 
 
-def test_what_a_killed_run_has_left_is_not_the_new_runs(tmp_path: Path) -> None:
-    for number in range(1, 4):
-        stale = Journal(journal_of(str(tmp_path / f"shard-{number}.json")))
-        stale.done("k0", record("0", 0.1))
-        stale.done("other", record("other", 0.1))
-        stale.close()
-    journal = watch(tmp_path, tasks_of("fine", "fine"))
-    assert finished(tmp_path) == Counter(["k0", "k1"]) and journal.record("k0")["FMQM"] == 0.5
+def test_what_an_earlier_run_began_and_did_not_end_comes_last(tmp_path: Path) -> None:
+    """It may have ended that run, and would this one."""
+    tasks = tasks_of("fine", "fine", "fine")
+    left = Journal(str(tmp_path / "journal"))
+    left.start("k0")
+    left.start("k1")
+    left.done("k1", record("1", None))
+    left.close()
+    journal = Journal(str(tmp_path / "journal"), resume=True)
+    score_with_workers(tasks, fake(tmp_path), tmp_path, 1, Limits(), journal, Log("", 3, 3, silent=True))
+    events = map(parse_line, (tmp_path / "journal").read_bytes().splitlines()[3:])
+    assert [event["done"] for event in events if "done" in event] == ["k1", "k2", "k0"]
+
+
+def test_a_worker_starts_no_workers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(WORKER, "1")
+    with pytest.raises(FMQMError, match="a worker starts no workers"):
+        watch(tmp_path, tasks_of("fine"))
+    assert not list(tmp_path.glob("*.pid"))
+
+
+def test_a_workers_own_arguments_come_before_a_double_dash() -> None:
+    assert workers_command("s.py", ["a.obj", "--", "-b.obj"])("S")[1:] == [
+        "s.py",
+        "--worker",
+        "S",
+        "a.obj",
+        "--",
+        "-b.obj",
+    ]
 
 
 def test_only_scores_are_adopted_and_only_new_ones(tmp_path: Path) -> None:
@@ -112,7 +139,9 @@ def test_only_scores_are_adopted_and_only_new_ones(tmp_path: Path) -> None:
 def test_a_worker_that_cannot_be_started_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(FileError, match="shard-1.json: a worker cannot be started"):
-        score_with_workers(tasks_of("fine"), ["x"], tmp_path / "file", 1, Limits(), Journal(), Log("", 1, 1))
+        score_with_workers(
+            tasks_of("fine"), lambda shard: ["x"], tmp_path / "file", 1, Limits(), Journal(), Log("", 1, 1)
+        )
 
 
 def test_a_watch_that_stood_still_does_not_take_the_workers_for_stuck(
@@ -168,7 +197,7 @@ PARENT = """
 import sys
 from pathlib import Path
 sys.path.insert(0, sys.argv[1])
-from fmqm_addon.cli.process import stop_on_signals
+from fmqm_addon.cli.stops import stop_on_signals
 from tests.batch.test_workers import tasks_of, watch
 stop_on_signals()  # as score.py
 try:

@@ -48,3 +48,36 @@ def test_outputs_are_kept_apart_from_inputs_and_each_other(tmp_path: Path) -> No
             check_apart({"--json": path, "--csv": f"{tmp_path}/{name}"}, [])
     with pytest.raises(SettingsError, match="both write to -"):
         check_apart({"--json": "-", "--csv": "-"}, [])
+
+
+@pytest.mark.skipif(os.name == "nt", reason="modes are POSIX's")
+def test_a_replaced_file_keeps_its_mode_and_a_new_one_gets_the_users(tmp_path: Path) -> None:
+    umask = os.umask(0o027)
+    try:
+        write_text(str(tmp_path / "new"), "text")
+        (tmp_path / "old").write_text("older")
+        (tmp_path / "old").chmod(0o604)
+        write_text(str(tmp_path / "old"), "newer")
+    finally:
+        os.umask(umask)
+    modes = [(tmp_path / name).stat().st_mode & 0o7777 for name in ("new", "old")]
+    assert modes == [0o640, 0o604] and (tmp_path / "old").read_text() == "newer"
+
+
+def test_names_may_be_as_long_as_the_system_allows(tmp_path: Path) -> None:
+    for length in (244, 255):
+        name = "n" * (length - 4) + ".csv"
+        write_text(str(tmp_path / name), "text")
+        assert (tmp_path / name).read_text() == "text"
+    assert len(list(tmp_path.iterdir())) == 2
+    with pytest.raises(FileError, match="cannot be written"):
+        write_text(str(tmp_path / ("n" * 256)), "text")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="a folder in use stays there")
+def test_a_working_folder_that_is_gone_is_a_files_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    with pytest.raises(FileError, match="^file: "):
+        write_text("file", "text")

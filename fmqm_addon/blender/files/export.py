@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import os
 import re
-import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr
 from io import StringIO
@@ -13,6 +12,7 @@ from pathlib import Path
 
 import bpy
 
+from ...folders import own_folder, take_place
 from ...metric.errors import FileError, FMQMError, MeshError, SettingsError
 from ...metric.surface import MeshArrays
 from ..materials.types import Reading
@@ -122,7 +122,7 @@ def save_version(spec: str, version: Version, path: str, reading: Reading = AS_F
             _refuse_input(path, str(place), inputs, FileError)
         for file, place in zip(written, places, strict=True):
             place.parent.mkdir(exist_ok=True)
-            os.replace(file, place)
+            take_place(file, place)
     return warnings
 
 
@@ -195,9 +195,9 @@ def _export(
         objects = make_plain(objects, alone)
     elif alone:
         _leave_only(objects[0])
-    with tempfile.TemporaryDirectory() as images:
+    with own_folder() as images:
         if suffix in _NAMING_IMAGES:
-            _write_images(objects, written.parent if suffix == ".obj" else Path(images), written.stem)
+            _write_images(objects, written.parent if suffix == ".obj" else images, written.stem)
         try:
             with redirect_stderr(StringIO()):  # Blender prints the tracebacks of exporters written in Python
                 EXPORTERS[suffix](str(written))
@@ -215,10 +215,10 @@ def _aside(path: str) -> Iterator[Path]:
     Raises:
         FileError: within it something cannot be written.
     """
-    target = Path(path)
     try:
-        with tempfile.TemporaryDirectory(prefix=f".{target.name}.", dir=target.parent) as folder:
-            yield Path(folder)
+        with own_folder(Path(path).parent) as folder:
+            (folder / "files").mkdir()  # with nothing of the folder's own beside them
+            yield folder / "files"
     except OSError as error:
         raise FileError(f"{path}: cannot be written ({error.strerror or error})") from error
 
