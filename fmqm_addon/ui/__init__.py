@@ -5,7 +5,9 @@ from __future__ import annotations
 
 import bpy
 
-from . import decimate, inputs, look, measuring, panels, properties, results, scene, stale
+from . import decimate, inputs, look, measuring, panels, results, stale
+from .properties import scene
+from .properties import settings as properties
 
 _look_groups = tuple(cls for cls in look.CLASSES if issubclass(cls, bpy.types.PropertyGroup))
 _look_rest = tuple(cls for cls in look.CLASSES if cls not in _look_groups)

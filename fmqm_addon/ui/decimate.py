@@ -25,7 +25,7 @@ from ..metric.settings import Settings
 from ..metric.stepper import Stepper, Work
 from . import session
 from .modal import SteppedOperator
-from .properties import metric_settings
+from .properties.settings import metric_settings
 
 
 class FMQMDecimate(bpy.types.PropertyGroup):

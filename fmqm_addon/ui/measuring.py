@@ -20,8 +20,8 @@ from ..report.trust_table import trust_dict
 from . import session, stale
 from .inputs import reference_of
 from .modal import SteppedOperator
-from .properties import PRESET_PROPERTIES, FMQMRow, item_target, metric_settings, numbers_text
-from .scene import FMQMScene
+from .properties.scene import FMQMScene
+from .properties.settings import PRESET_PROPERTIES, FMQMRow, item_target, metric_settings, numbers_text
 
 
 def why_not(fmqm: FMQMScene) -> str:

@@ -14,7 +14,8 @@ from ..report.records import SHOWN
 from ..report.trust_table import Line, trust_lines
 from . import session
 from .measuring import why_not
-from .properties import (
+from .properties.scene import FMQMScene
+from .properties.settings import (
     FMQMItem,
     FMQMRow,
     active_row,
@@ -26,7 +27,6 @@ from .properties import (
     row_trust,
 )
 from .results import EXPLAINED, comparable, settings_name
-from .scene import FMQMScene
 
 _WIDE = 330  # pixels at scale 1: from here on the rows have room for the four features
 _CHARACTER = 6.6  # pixels at scale 1, of the panel's font, about

@@ -18,7 +18,7 @@ from ..report.atomic_files import write_text
 from ..report.npz import save_fields
 from ..report.records import SHOWN, PairScore, csv_text, json_text, table_text
 from . import session, stale
-from .properties import FMQMRow, active_row, row_attribution, row_reverse, row_scores, row_stderr, row_trust
+from .properties.settings import FMQMRow, active_row, row_attribution, row_reverse, row_scores, row_stderr, row_trust
 
 # What an artist should know of each number: label, and what a low value looks like.
 EXPLAINED = {

@@ -18,7 +18,8 @@ from ..metric.evaluation import Result
 from ..metric.fields import Fields
 from ..metric.geometry import Floats, Ints, cross
 from ..report.visual import layers, probe
-from . import overlay, properties, session
+from . import overlay, session
+from .properties import settings as properties
 
 if TYPE_CHECKING:
     from .look import FMQMLook

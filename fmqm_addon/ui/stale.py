@@ -16,7 +16,7 @@ from bpy.app.handlers import persistent
 from ..blender.scene.target import Target, fingerprint, in_edit_mode
 from ..comparison.alignment import place_counts
 from . import session, show
-from .properties import FMQMRow, item_target, kept
+from .properties.settings import FMQMRow, item_target, kept
 
 _WATCHED = (bpy.types.Object, bpy.types.Mesh, bpy.types.Material, bpy.types.NodeTree, bpy.types.Image)
 _DELAY = 0.7  # seconds without a change before the rows are looked at

@@ -11,6 +11,7 @@ from unittest.mock import MagicMock
 import bpy
 import numpy as np
 import pytest
+from fmqm_addon.ui.properties.settings.settings import row_attribution
 
 import fmqm_addon
 from fmqm_addon import api
@@ -24,7 +25,6 @@ from fmqm_addon.metric.settings import PRESETS, Settings
 from fmqm_addon.metric.surface import MeshArrays
 from fmqm_addon.metric.texture import Material, PlainColor
 from fmqm_addon.ui import inputs, panels
-from fmqm_addon.ui.properties import row_attribution
 
 from . import scenes
 from .script import noise, read_json, score, strict_json, write_png, write_torus

@@ -12,6 +12,7 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
+from fmqm_addon.ui.properties.settings.settings import row_reverse, row_trust
 
 import fmqm_addon
 from fmqm_addon import api
@@ -23,7 +24,6 @@ from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.surface import MeshArrays
 from fmqm_addon.report.trust_table import trust_dict
 from fmqm_addon.ui import panels
-from fmqm_addon.ui.properties import row_reverse, row_trust
 from fmqm_addon.ui.results import pair_of
 
 from . import scenes

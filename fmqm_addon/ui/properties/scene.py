@@ -6,9 +6,9 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, IntProperty, PointerProperty
 
-from .decimate import FMQMDecimate
-from .look import FMQMLook, row_chosen
-from .properties import FMQMItem, FMQMRow, FMQMSettings, is_asset
+from ..decimate import FMQMDecimate
+from ..look import FMQMLook, row_chosen
+from .settings import FMQMItem, FMQMRow, FMQMSettings, is_asset
 
 
 def _can_be_picked(_: FMQMScene, object_: bpy.types.Object) -> bool:

@@ -11,11 +11,11 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
-from ..blender.scene.members import is_measured
-from ..comparison.alignment import SPACES
-from ..metric.evaluation import COLUMNS
-from ..metric.settings import FAST_SCORED_PATCHES, SETTING_NAMES, Settings
-from ..report.trust_table import Report
+from ...blender.scene.members import is_measured
+from ...comparison.alignment import SPACES
+from ...metric.score import COLUMNS
+from ...metric.settings import FAST_SCORED_PATCHES, SETTING_NAMES, Settings
+from ...report.trust_table import Report
 
 SEED_LIMIT = 2**31 - 1  # of an IntProperty
 CUSTOM = "CUSTOM"
