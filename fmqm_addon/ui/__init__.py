@@ -5,7 +5,10 @@ from __future__ import annotations
 
 import bpy
 
-from . import decimate, inputs, look, measuring, panels, results, stale
+from . import panels, stale
+from .operators import decimate, inputs, results
+from .operators import measure as measuring
+from .operators import view as look
 from .properties import scene
 from .properties import settings as properties
 

@@ -13,7 +13,8 @@ from ..metric.evaluation import COLUMNS
 from ..report.records import SHOWN
 from ..report.trust_table import Line, trust_lines
 from . import session
-from .measuring import why_not
+from .operators.measure import why_not
+from .operators.results import EXPLAINED, comparable, settings_name
 from .properties.scene import FMQMScene
 from .properties.settings import (
     FMQMItem,
@@ -26,7 +27,6 @@ from .properties.settings import (
     row_stderr,
     row_trust,
 )
-from .results import EXPLAINED, comparable, settings_name
 
 _WIDE = 330  # pixels at scale 1: from here on the rows have room for the four features
 _CHARACTER = 6.6  # pixels at scale 1, of the panel's font, about

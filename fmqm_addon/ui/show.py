@@ -22,7 +22,7 @@ from . import overlay, session
 from .properties import settings as properties
 
 if TYPE_CHECKING:
-    from .look import FMQMLook
+    from .operators.view import FMQMLook
 
 WORST_COUNT = 20
 POINT = 1.1  # usual radius of a point, in mean distances between neighbors

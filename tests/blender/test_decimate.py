@@ -41,7 +41,7 @@ from fmqm_addon.metric.errors import FMQMError, MeshError, SettingsError
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.stepper import Progress
 from fmqm_addon.metric.surface import MeshArrays, finish
-from fmqm_addon.ui import decimate as ui_decimate
+from fmqm_addon.ui.operators import decimate as ui_decimate
 
 from . import scenes
 from .script import SCORE, noise, read_json, score, strict_json, write_png, write_torus

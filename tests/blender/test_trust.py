@@ -24,7 +24,7 @@ from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.surface import MeshArrays
 from fmqm_addon.report.trust_table import trust_dict
 from fmqm_addon.ui import panels
-from fmqm_addon.ui.results import pair_of
+from fmqm_addon.ui.operators.results import pair_of
 
 from . import scenes
 

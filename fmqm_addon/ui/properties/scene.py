@@ -6,8 +6,8 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, IntProperty, PointerProperty
 
-from ..decimate import FMQMDecimate
-from ..look import FMQMLook, row_chosen
+from ..operators.decimate import FMQMDecimate
+from ..operators.view import FMQMLook, row_chosen
 from .settings import FMQMItem, FMQMRow, FMQMSettings, is_asset
 
 

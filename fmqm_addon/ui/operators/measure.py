@@ -11,17 +11,17 @@ import bpy
 import numpy as np
 from bl_operators.presets import AddPresetBase
 
-from ..blender.scene.measure import Outcome, measuring
-from ..blender.scene.target import Target, target_of
-from ..comparison.pair import Question
-from ..metric.errors import FMQMError
-from ..metric.stepper import Stepper
-from ..report.trust_table import trust_dict
-from . import session, stale
+from ...blender.scene.measure import Outcome, measuring
+from ...blender.scene.target import Target, target_of
+from ...comparison.pair import Question
+from ...metric.errors import FMQMError
+from ...metric.score import Stepper
+from ...report.trust_table import trust_dict
+from .. import session, stale
+from ..modal import SteppedOperator
+from ..properties.scene import FMQMScene
+from ..properties.settings import PRESET_PROPERTIES, FMQMRow, item_target, metric_settings, numbers_text
 from .inputs import reference_of
-from .modal import SteppedOperator
-from .properties.scene import FMQMScene
-from .properties.settings import PRESET_PROPERTIES, FMQMRow, item_target, metric_settings, numbers_text
 
 
 def why_not(fmqm: FMQMScene) -> str:

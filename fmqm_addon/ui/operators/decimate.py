@@ -8,7 +8,7 @@ from typing import ClassVar
 import bpy
 from bpy.props import BoolProperty, FloatProperty, IntProperty, StringProperty
 
-from ..blender.scene.decimate import (
+from ...blender.scene.decimate import (
     LEAST_TRIANGLES,
     Found,
     Reader,
@@ -19,13 +19,13 @@ from ..blender.scene.decimate import (
     reducing,
     scene_reader,
 )
-from ..blender.scene.target import fingerprint, target_of
-from ..metric.errors import FMQMError
-from ..metric.settings import Settings
-from ..metric.stepper import Stepper, Work
-from . import session
-from .modal import SteppedOperator
-from .properties.settings import metric_settings
+from ...blender.scene.target import fingerprint, target_of
+from ...metric.errors import FMQMError
+from ...metric.score import Stepper, Work
+from ...metric.settings import Settings
+from .. import session
+from ..modal import SteppedOperator
+from ..properties.settings import metric_settings
 
 
 class FMQMDecimate(bpy.types.PropertyGroup):

@@ -8,9 +8,9 @@ from typing import ClassVar
 
 import bpy
 
-from ..blender.scene.lods import find_lods
-from .properties.scene import FMQMScene
-from .properties.settings import is_asset, kept
+from ...blender.scene.lods import find_lods
+from ..properties.scene import FMQMScene
+from ..properties.settings import is_asset, kept
 
 
 def _selected_assets(context: bpy.types.Context) -> list[bpy.types.Object]:

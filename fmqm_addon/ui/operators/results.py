@@ -10,15 +10,16 @@ from typing import Any, ClassVar
 import bpy
 from bpy.props import EnumProperty, StringProperty
 
-from .. import VERSION
-from ..metric.errors import FMQMError
-from ..metric.evaluation import Scores
-from ..metric.settings import PRESETS, SETTING_NAMES, Settings
-from ..report.atomic_files import write_text
-from ..report.npz import save_fields
-from ..report.records import SHOWN, PairScore, csv_text, json_text, table_text
-from . import session, stale
-from .properties.settings import FMQMRow, active_row, row_attribution, row_reverse, row_scores, row_stderr, row_trust
+from ... import VERSION
+from ...metric.errors import FMQMError
+from ...metric.score import COLUMNS
+from ...metric.settings import PRESETS, SETTING_NAMES, Settings
+from ...metric.spatial import Floats
+from ...report.atomic_files import write_text
+from ...report.npz import save_fields
+from ...report.records import SHOWN, PairScore, csv_text, json_text, table_text
+from .. import session, stale
+from ..properties.settings import FMQMRow, active_row, row_attribution, row_reverse, row_scores, row_stderr, row_trust
 
 # What an artist should know of each number: label, and what a low value looks like.
 EXPLAINED = {

@@ -18,11 +18,11 @@ from bpy.props import (
     StringProperty,
 )
 
-from ..blender.display import scene_objects
-from ..metric.errors import FMQMError
-from ..report.visual import layers
-from . import overlay, session, show
-from .properties import settings as properties
+from ...blender.display import scene_objects
+from ...metric.errors import FMQMError
+from ...report.visual import layers
+from .. import overlay, session, show
+from ..properties import settings as properties
 
 PARENT = "FMQM_PT_main"
 _REACH = 14  # pixels around the mouse in which a sample is picked
