@@ -5,10 +5,11 @@ from __future__ import annotations
 
 import bpy
 
-from . import panels, stale
+from . import stale
 from .operators import decimate, inputs, results
 from .operators import measure as measuring
 from .operators import view as look
+from .panels import results as panels
 from .properties import scene
 from .properties import settings as properties
 

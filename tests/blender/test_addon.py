@@ -22,10 +22,11 @@ from fmqm_addon.blender.scene.target import target_of
 from fmqm_addon.metric.errors import SettingsError
 from fmqm_addon.metric.evaluation import COLUMNS
 from fmqm_addon.metric.settings import Settings
-from fmqm_addon.ui import panels, session, stale
+from fmqm_addon.ui import session, stale
 from fmqm_addon.ui.modal import SteppedOperator
 from fmqm_addon.ui.operators import inputs, results
 from fmqm_addon.ui.operators import measure as measuring
+from fmqm_addon.ui.panels import results as panels
 
 from . import scenes
 from .script import read_json, score

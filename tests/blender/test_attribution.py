@@ -23,8 +23,8 @@ from fmqm_addon.comparison.measurement import Measurement
 from fmqm_addon.comparison.pair import Question
 from fmqm_addon.metric.settings import PRESETS, Settings
 from fmqm_addon.metric.surface import MeshArrays
-from fmqm_addon.ui import panels
 from fmqm_addon.ui.operators import inputs
+from fmqm_addon.ui.panels import results as panels
 
 from . import scenes
 from .script import noise, read_json, score, strict_json, write_png, write_torus

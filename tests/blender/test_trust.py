@@ -23,8 +23,8 @@ from fmqm_addon.metric.evaluation import COLUMNS
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.surface import MeshArrays
 from fmqm_addon.report.trust_table import trust_dict
-from fmqm_addon.ui import panels
 from fmqm_addon.ui.operators.results import pair_of
+from fmqm_addon.ui.panels import results as panels
 
 from . import scenes
 

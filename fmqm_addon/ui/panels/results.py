@@ -8,15 +8,15 @@ from typing import ClassVar
 import bpy
 from bl_ui.utils import PresetPanel
 
-from ..comparison.alignment import PLACE_LABELS
-from ..metric.evaluation import COLUMNS
-from ..report.records import SHOWN
-from ..report.trust_table import Line, trust_lines
-from . import session
-from .operators.measure import why_not
-from .operators.results import EXPLAINED, comparable, settings_name
-from .properties.scene import FMQMScene
-from .properties.settings import (
+from ...comparison.alignment import PLACE_LABELS
+from ...metric.score import COLUMNS
+from ...report.records import SHOWN
+from ...report.trust_table import Line, trust_lines
+from .. import session
+from ..operators.measure import why_not
+from ..operators.results import EXPLAINED, comparable, settings_name
+from ..properties.scene import FMQMScene
+from ..properties.settings import (
     FMQMItem,
     FMQMRow,
     active_row,
