@@ -15,8 +15,9 @@ from bpy.app.handlers import persistent
 
 from ..blender.scene.target import Target, fingerprint, in_edit_mode
 from ..comparison.alignment import place_counts
-from . import session, show
+from . import session
 from .properties.settings import FMQMRow, item_target, kept
+from .view import cloud as show
 
 _WATCHED = (bpy.types.Object, bpy.types.Mesh, bpy.types.Material, bpy.types.NodeTree, bpy.types.Image)
 _DELAY = 0.7  # seconds without a change before the rows are looked at

@@ -24,7 +24,9 @@ from fmqm_addon.metric.geometry import dot
 from fmqm_addon.metric.sampling import Samples
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.report.visual import colormap, layers, probe
-from fmqm_addon.ui import overlay, session, show
+from fmqm_addon.ui import session
+from fmqm_addon.ui.view import cloud as show
+from fmqm_addon.ui.view import overlay
 
 from . import scenes
 

@@ -21,8 +21,10 @@ from bpy.props import (
 from ...blender.display import scene_objects
 from ...metric.errors import FMQMError
 from ...report.visual import layers
-from .. import overlay, session, show
+from .. import session
 from ..properties import settings as properties
+from ..view import cloud as show
+from ..view import overlay
 
 PARENT = "FMQM_PT_main"
 _REACH = 14  # pixels around the mouse in which a sample is picked

@@ -18,10 +18,10 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 from numpy.typing import NDArray
 
-from ..blender.display import scene_objects
-from ..metric.geometry import Floats
-from . import session
-from .properties.settings import active_row
+from ...blender.display import scene_objects
+from ...metric.spatial import Floats
+from .. import session
+from ..properties.settings import active_row
 
 LEGEND = "fmqm_legend"  # custom property of the objects that have a legend: report.visual.layers.Legend as JSON
 _FONT = 0

@@ -12,17 +12,18 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
-from ..blender.display import scene_objects, viewport
-from ..metric.errors import FMQMError
-from ..metric.evaluation import Result
-from ..metric.fields import Fields
-from ..metric.geometry import Floats, Ints, cross
-from ..report.visual import layers, probe
-from . import overlay, session
-from .properties import settings as properties
+from ...blender.display import scene_objects, viewport
+from ...metric.errors import FMQMError
+from ...metric.fields import Fields
+from ...metric.score import Result
+from ...metric.spatial import Floats, Ints, cross
+from ...report.visual import layers, probe
+from .. import session
+from ..properties import settings as properties
+from . import overlay
 
 if TYPE_CHECKING:
-    from .operators.view import FMQMLook
+    from ..operators.view import FMQMLook
 
 WORST_COUNT = 20
 POINT = 1.1  # usual radius of a point, in mean distances between neighbors
