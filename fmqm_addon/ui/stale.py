@@ -13,22 +13,15 @@ from collections.abc import Callable
 import bpy
 from bpy.app.handlers import persistent
 
-from ..blender.scene.target import Target, fingerprint, in_edit_mode
+from ..blender.scene.target import fingerprint, in_edit_mode
 from ..comparison.alignment import place_counts
 from . import session
-from .properties.settings import FMQMRow, item_target, kept
-from .view import cloud as show
+from .properties.items import item_target, kept
+from .properties.rows import row_targets
+from .view.shown import settle_colors
 
 _WATCHED = (bpy.types.Object, bpy.types.Mesh, bpy.types.Material, bpy.types.NodeTree, bpy.types.Image)
 _DELAY = 0.7  # seconds without a change before the rows are looked at
-
-
-def row_targets(row: FMQMRow) -> tuple[Target, Target]:
-    """What the row compared: the reference and the other."""
-    return (
-        Target(row.reference_kind, row.reference_name, row.bare_reference),
-        Target(row.kind, row.name),
-    )
 
 
 def check(scene: bpy.types.Scene) -> None:
@@ -107,7 +100,7 @@ def _on_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 @_kept
 def _on_undo(*_: object) -> None:
     soon()
-    bpy.app.timers.register(show.settle_colors, first_interval=0)
+    bpy.app.timers.register(settle_colors, first_interval=0)
 
 
 @_kept

@@ -13,20 +13,22 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from fmqm_addon.ui.properties.settings.settings import item_target, metric_settings, row_scores
 
 import fmqm_addon
-from fmqm_addon import api, ui
+from fmqm_addon import api
 from fmqm_addon.blender.scene import measure, target
 from fmqm_addon.blender.scene.target import target_of
 from fmqm_addon.metric.errors import SettingsError
 from fmqm_addon.metric.evaluation import COLUMNS
 from fmqm_addon.metric.settings import Settings
-from fmqm_addon.ui import session, stale
+from fmqm_addon.ui import operators, panels, properties, session, stale
 from fmqm_addon.ui.modal import SteppedOperator
-from fmqm_addon.ui.operators import inputs, results
+from fmqm_addon.ui.operators import inputs
 from fmqm_addon.ui.operators import measure as measuring
-from fmqm_addon.ui.panels import results as panels
+from fmqm_addon.ui.properties.items import item_target
+from fmqm_addon.ui.properties.rows import comparable, row_scores, settings_name
+from fmqm_addon.ui.properties.scene import FMQMScene
+from fmqm_addon.ui.properties.settings import metric_settings
 
 from . import scenes
 from .script import read_json, score
@@ -42,7 +44,7 @@ def addon(empty_session: None) -> Iterator[None]:
 
 
 @pytest.fixture
-def fmqm() -> ui.properties.scene.FMQMScene:
+def fmqm() -> FMQMScene:
     made = bpy.context.scene.fmqm
     made.settings.samples, made.settings.patches = QUICK.samples, QUICK.patches
     return made
@@ -87,7 +89,7 @@ def why_not() -> str:
     return str(caught.value)
 
 
-def test_use_selection(fmqm: ui.properties.scene.FMQMScene, lods: list[bpy.types.Object]) -> None:
+def test_use_selection(fmqm: FMQMScene, lods: list[bpy.types.Object]) -> None:
     light = bpy.data.objects.new("Light", bpy.data.lights.new("Light", "SUN"))
     bpy.context.scene.collection.objects.link(light)
     select(light, lods[2], lods[1], lods[0])
@@ -99,7 +101,7 @@ def test_use_selection(fmqm: ui.properties.scene.FMQMScene, lods: list[bpy.types
         bpy.ops.fmqm.use_selection()
 
 
-def test_the_list(fmqm: ui.properties.scene.FMQMScene, lods: list[bpy.types.Object]) -> None:
+def test_the_list(fmqm: FMQMScene, lods: list[bpy.types.Object]) -> None:
     assert bpy.ops.fmqm.find_lods() == {"FINISHED"}
     assert [item.object for item in fmqm.compared] == lods[1:]
     assert bpy.ops.fmqm.remove_compared() == {"FINISHED"}
@@ -111,13 +113,13 @@ def test_the_list(fmqm: ui.properties.scene.FMQMScene, lods: list[bpy.types.Obje
     assert not fmqm.compared
 
 
-def test_find_lods_without_any(fmqm: ui.properties.scene.FMQMScene) -> None:
+def test_find_lods_without_any(fmqm: FMQMScene) -> None:
     scenes.cube()
     assert bpy.ops.fmqm.find_lods() == {"CANCELLED"}
     assert fmqm.reference is None
 
 
-def test_reasons_for_a_grey_button(fmqm: ui.properties.scene.FMQMScene, lods: list[bpy.types.Object]) -> None:
+def test_reasons_for_a_grey_button(fmqm: FMQMScene, lods: list[bpy.types.Object]) -> None:
     assert "Choose a reference" in why_not()
     fmqm.reference = lods[0]
     assert "Add an object" in why_not()
@@ -125,16 +127,14 @@ def test_reasons_for_a_grey_button(fmqm: ui.properties.scene.FMQMScene, lods: li
     assert "Rock_LOD0 is the reference and in the list too" in why_not()
 
 
-def test_settings_that_contradict(fmqm: ui.properties.scene.FMQMScene, lods: list[bpy.types.Object]) -> None:
+def test_settings_that_contradict(fmqm: FMQMScene, lods: list[bpy.types.Object]) -> None:
     compare(lods[0], lods[1])
     fmqm.settings.samples = 100
     assert "at least 32 for each" in why_not()
     assert not fmqm.rows
 
 
-def test_the_same_doubles_as_the_script(
-    fmqm: ui.properties.scene.FMQMScene, lods: list[bpy.types.Object], tmp_path: Path
-) -> None:
+def test_the_same_doubles_as_the_script(fmqm: FMQMScene, lods: list[bpy.types.Object], tmp_path: Path) -> None:
     lods[1].location.x += 5  # set beside the reference
     fmqm.settings.sigma, fmqm.settings.seed, fmqm.settings.repeats = 0.07, 3, 2
     compare(lods[0], *lods[1:])
@@ -197,9 +197,7 @@ def test_space_and_match_scale_of_the_script(lods: list[bpy.types.Object], tmp_p
     assert local["settings"]["space"] == "local" and local["settings"]["match_scale"] is True
 
 
-def test_nothing_is_left_and_nothing_is_touched(
-    fmqm: ui.properties.scene.FMQMScene, lods: list[bpy.types.Object]
-) -> None:
+def test_nothing_is_left_and_nothing_is_touched(fmqm: FMQMScene, lods: list[bpy.types.Object]) -> None:
     lods[1].hide_set(True)
     lods[2].hide_viewport = True
     select(lods[0])
@@ -215,7 +213,7 @@ def test_nothing_is_left_and_nothing_is_touched(
     assert lods[1].hide_get() and lods[2].hide_viewport
 
 
-def test_own_modifiers(fmqm: ui.properties.scene.FMQMScene, lods: list[bpy.types.Object]) -> None:
+def test_own_modifiers(fmqm: FMQMScene, lods: list[bpy.types.Object]) -> None:
     lod = lods[1]
     select(lods[0])
     with pytest.raises(RuntimeError, match="has no modifiers"):
@@ -238,9 +236,7 @@ def test_own_modifiers(fmqm: ui.properties.scene.FMQMScene, lods: list[bpy.types
     assert list(outcome.scores) == [1.0] * 5
 
 
-def test_own_modifiers_in_edit_mode_and_switched_off(
-    fmqm: ui.properties.scene.FMQMScene, lods: list[bpy.types.Object]
-) -> None:
+def test_own_modifiers_in_edit_mode_and_switched_off(fmqm: FMQMScene, lods: list[bpy.types.Object]) -> None:
     lod = lods[1]
     select(lod)
     bpy.ops.fmqm.own_modifiers()
@@ -255,7 +251,7 @@ def test_own_modifiers_in_edit_mode_and_switched_off(
     assert numbers(fmqm.rows[0]) == expected
 
 
-def test_empties_and_collections_count_as_one(fmqm: ui.properties.scene.FMQMScene, picture: Path) -> None:
+def test_empties_and_collections_count_as_one(fmqm: FMQMScene, picture: Path) -> None:
     skin = scenes.textured(picture)
     whole = scenes.cube("Whole", materials=[skin])
     halves = [
@@ -280,7 +276,7 @@ def test_empties_and_collections_count_as_one(fmqm: ui.properties.scene.FMQMScen
     assert [row.kind for row in fmqm.rows] == ["OBJECT", "COLLECTION", "OBJECT"]
 
 
-def test_an_error_is_one_rows(fmqm: ui.properties.scene.FMQMScene, lods: list[bpy.types.Object]) -> None:
+def test_an_error_is_one_rows(fmqm: FMQMScene, lods: list[bpy.types.Object]) -> None:
     bare = scenes.add("Bare", [(0, 0, 0)], [])
     no_image = scenes.material("Blank")
     scenes.image_node(no_image, None)
@@ -299,15 +295,13 @@ def test_an_error_is_one_rows(fmqm: ui.properties.scene.FMQMScene, lods: list[bp
     assert fmqm.rows[0].name == "Rock_LOD1"
 
 
-def test_a_reference_that_cannot_be_measured(fmqm: ui.properties.scene.FMQMScene, lods: list[bpy.types.Object]) -> None:
+def test_a_reference_that_cannot_be_measured(fmqm: FMQMScene, lods: list[bpy.types.Object]) -> None:
     compare(scenes.add("Bare", [(0, 0, 0)], []), lods[1])
     assert bpy.ops.fmqm.measure() == {"FINISHED"}
     assert "no faces" in fmqm.rows[0].error
 
 
-def test_rows_are_replaced_and_saved(
-    fmqm: ui.properties.scene.FMQMScene, lods: list[bpy.types.Object], tmp_path: Path
-) -> None:
+def test_rows_are_replaced_and_saved(fmqm: FMQMScene, lods: list[bpy.types.Object], tmp_path: Path) -> None:
     compare(lods[0], lods[1], lods[2])
     bpy.ops.fmqm.measure()
     uids = [row.uid for row in fmqm.rows]
@@ -322,7 +316,7 @@ def test_rows_are_replaced_and_saved(
     assert [numbers(row) for row in bpy.context.scene.fmqm.rows] == before
 
 
-def test_the_place_of_the_compared(fmqm: ui.properties.scene.FMQMScene, lods: list[bpy.types.Object]) -> None:
+def test_the_place_of_the_compared(fmqm: FMQMScene, lods: list[bpy.types.Object]) -> None:
     lods[1].location.x += 5
     compare(lods[0], lods[1])
     bpy.ops.fmqm.measure()
@@ -348,7 +342,7 @@ def test_the_place_of_the_compared(fmqm: ui.properties.scene.FMQMScene, lods: li
     ],
 )
 def test_rows_that_are_out_of_date(
-    fmqm: ui.properties.scene.FMQMScene, lods: list[bpy.types.Object], change: object, stale: set[str]
+    fmqm: FMQMScene, lods: list[bpy.types.Object], change: object, stale: set[str]
 ) -> None:
     compare(lods[0], *lods[1:])
     bpy.ops.fmqm.measure()
@@ -358,14 +352,14 @@ def test_rows_that_are_out_of_date(
     assert {row.name for row in fmqm.rows if row.uid in session.stale} == (names or set())
 
 
-def stale_names(fmqm: ui.properties.scene.FMQMScene) -> set[str]:
+def stale_names(fmqm: FMQMScene) -> set[str]:
     bpy.context.view_layer.update()
     stale.check(bpy.context.scene)
     return {row.name for row in fmqm.rows if row.uid in session.stale}
 
 
 def test_painting_marks_and_saving_the_image_does_not_take_the_mark_away(
-    fmqm: ui.properties.scene.FMQMScene, lods: list[bpy.types.Object], tmp_path: Path
+    fmqm: FMQMScene, lods: list[bpy.types.Object], tmp_path: Path
 ) -> None:
     own = scenes.write_png(tmp_path / "own.png", scenes.noise(32))
     lods[1].data.materials[0] = scenes.textured(own, "Own")
@@ -390,7 +384,7 @@ def test_painting_marks_and_saving_the_image_does_not_take_the_mark_away(
 
 
 def test_painting_of_large_images_marks(
-    fmqm: ui.properties.scene.FMQMScene, lods: list[bpy.types.Object], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    fmqm: FMQMScene, lods: list[bpy.types.Object], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Without a look at all their pixels."""
     monkeypatch.setattr(target, "_MOST_PAINTED", 32 * 32 * 4 - 1)
@@ -404,9 +398,7 @@ def test_painting_of_large_images_marks(
     assert not image.is_dirty and stale_names(fmqm) == {"Rock_LOD1"}
 
 
-def test_painting_of_packed_images_marks(
-    fmqm: ui.properties.scene.FMQMScene, lods: list[bpy.types.Object], tmp_path: Path
-) -> None:
+def test_painting_of_packed_images_marks(fmqm: FMQMScene, lods: list[bpy.types.Object], tmp_path: Path) -> None:
     """As glTF files bring them, and of a UDIM set."""
     materials = [scenes.textured(scenes.write_png(tmp_path / f"{n}.100{n}.png", scenes.noise(32))) for n in (1, 2)]
     one, tiles = (scenes.base_color(each).links[0].from_node.image for each in materials)
@@ -423,7 +415,7 @@ def test_painting_of_packed_images_marks(
     assert not one.is_dirty and stale_names(fmqm) == {lods[1].name}
 
 
-def test_vertex_colors_mark(fmqm: ui.properties.scene.FMQMScene, lods: list[bpy.types.Object]) -> None:
+def test_vertex_colors_mark(fmqm: FMQMScene, lods: list[bpy.types.Object]) -> None:
     mesh = lods[1].data
     mesh.materials.clear()
     colors = mesh.color_attributes.new("Col", "FLOAT_COLOR", "POINT")
@@ -434,9 +426,7 @@ def test_vertex_colors_mark(fmqm: ui.properties.scene.FMQMScene, lods: list[bpy.
     assert stale_names(fmqm) == {"Rock_LOD1"}
 
 
-def test_a_pose_marks_and_moving_all_together_does_not(
-    fmqm: ui.properties.scene.FMQMScene, lods: list[bpy.types.Object]
-) -> None:
+def test_a_pose_marks_and_moving_all_together_does_not(fmqm: FMQMScene, lods: list[bpy.types.Object]) -> None:
     rig = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
     bpy.context.scene.collection.objects.link(rig)
     bpy.context.view_layer.objects.active = rig
@@ -459,7 +449,7 @@ def test_a_pose_marks_and_moving_all_together_does_not(
 
 
 def test_saving_the_file_and_edit_mode_change_nothing(
-    fmqm: ui.properties.scene.FMQMScene, lods: list[bpy.types.Object], tmp_path: Path
+    fmqm: FMQMScene, lods: list[bpy.types.Object], tmp_path: Path
 ) -> None:
     lods[2].data.color_attributes.new("Col", "BYTE_COLOR", "CORNER")
     compare(lods[0], *lods[1:])
@@ -483,9 +473,7 @@ def test_saving_the_file_and_edit_mode_change_nothing(
     assert stale_names(fmqm) == {"Rock_LOD1", "Rock_LOD2"}
 
 
-def test_deleted_objects_are_gone_and_let_go_of(
-    fmqm: ui.properties.scene.FMQMScene, lods: list[bpy.types.Object]
-) -> None:
+def test_deleted_objects_are_gone_and_let_go_of(fmqm: FMQMScene, lods: list[bpy.types.Object]) -> None:
     compare(lods[0], *lods[1:])
     bpy.ops.fmqm.measure()
     before = numbers(fmqm.rows[1])
@@ -509,7 +497,7 @@ def test_deleted_objects_are_gone_and_let_go_of(
 
 
 def test_scores_stay_where_an_object_is_deleted_while_it_is_measured(
-    fmqm: ui.properties.scene.FMQMScene, lods: list[bpy.types.Object]
+    fmqm: FMQMScene, lods: list[bpy.types.Object]
 ) -> None:
     compare(lods[0], *lods[1:])
     bpy.ops.fmqm.measure()
@@ -537,7 +525,7 @@ def test_a_slice_of_work_ends_before_something_else_begins() -> None:
     assert seen == [("Reading", 0), ("Reading: baking", 1), ("Preparing", 2)]
 
 
-def test_sorting_keeps_the_choice(fmqm: ui.properties.scene.FMQMScene, lods: list[bpy.types.Object]) -> None:
+def test_sorting_keeps_the_choice(fmqm: FMQMScene, lods: list[bpy.types.Object]) -> None:
     compare(lods[0], *lods[1:])
     bpy.ops.fmqm.measure()
     chosen = fmqm.rows[fmqm.row_index].name
@@ -553,7 +541,7 @@ def test_sorting_keeps_the_choice(fmqm: ui.properties.scene.FMQMScene, lods: lis
     assert not fmqm.rows
 
 
-def test_saving(fmqm: ui.properties.scene.FMQMScene, lods: list[bpy.types.Object], tmp_path: Path) -> None:
+def test_saving(fmqm: FMQMScene, lods: list[bpy.types.Object], tmp_path: Path) -> None:
     with pytest.raises(RuntimeError, match="Nothing has been measured"):
         bpy.ops.fmqm.save_results(filepath=str(tmp_path / "a.json"))
     compare(lods[0], *lods[1:])
@@ -580,9 +568,7 @@ def test_saving(fmqm: ui.properties.scene.FMQMScene, lods: list[bpy.types.Object
         bpy.ops.fmqm.save_results(filepath=str(tmp_path / "out.npz"), file_format="npz")
 
 
-def test_rows_at_other_settings_are_told_apart(
-    fmqm: ui.properties.scene.FMQMScene, lods: list[bpy.types.Object]
-) -> None:
+def test_rows_at_other_settings_are_told_apart(fmqm: FMQMScene, lods: list[bpy.types.Object]) -> None:
     rows = []
     for lod, preset, seed in ((lods[1], "FAST", 0), (lods[2], "FAST", 3), (lods[0], "CUSTOM", 3)):
         fmqm.settings.preset, fmqm.settings.seed = preset, seed
@@ -591,8 +577,8 @@ def test_rows_at_other_settings_are_told_apart(
         outcome = measure.Outcome(target_of(lods[0]), target_of(lod))
         measuring._write_row(fmqm, outcome, json.dumps(metric_settings(fmqm.settings).as_dict()))
         rows.append(fmqm.rows[len(rows)])
-    assert [results.settings_name(row) for row in rows] == ["Fast", "Fast", "Custom"]
-    assert results.comparable(rows[0], rows[1]) and not results.comparable(rows[1], rows[2])
+    assert [settings_name(row) for row in rows] == ["Fast", "Fast", "Custom"]
+    assert comparable(rows[0], rows[1]) and not comparable(rows[1], rows[2])
 
 
 def test_presets() -> None:
@@ -613,7 +599,7 @@ def test_presets() -> None:
     assert metric_settings(settings) == Settings(seed=5)
 
 
-def test_operator_presets(fmqm: ui.properties.scene.FMQMScene) -> None:
+def test_operator_presets(fmqm: FMQMScene) -> None:
     fmqm.settings.color_units, fmqm.settings.attribution = 77, True
     assert bpy.ops.fmqm.preset_add(name="Mine") == {"FINISHED"}
     paths = bpy.utils.preset_paths("fmqm")
@@ -636,21 +622,17 @@ def test_every_flag_of_the_script_is_a_property() -> None:
 def test_texts() -> None:
     """Names and tooltips as Blender's: Title Case, no full stop at the end."""
     small = {"and", "as", "by", "for", "in", "is", "of", "on", "the", "to", "with"}
-    groups = [
-        ui.properties.settings.FMQMItem,
-        ui.properties.settings.FMQMRow,
-        ui.properties.settings.FMQMSettings,
-        ui.properties.scene.FMQMScene,
-    ]
-    for cls in groups:
+    for cls in properties.CLASSES:
         for prop in cls.bl_rna.properties:
             if prop.identifier in {"rna_type"} or (prop.identifier == "name" and not prop.description):
                 continue
             assert prop.name and prop.description, (cls, prop.identifier)
             assert not prop.description.endswith("."), prop.description
             assert all(word in small or word[0].isupper() or word[0] in "(" for word in prop.name.split()), prop.name
-    for cls in (*inputs.CLASSES, *measuring.CLASSES, *results.CLASSES, *panels.CLASSES):
-        label = "" if cls is panels.FMQM_PT_presets else getattr(cls, "bl_label", "")  # Blender writes into that one
+    for cls in (*operators.CLASSES, *panels.CLASSES):
+        label = (
+            "" if cls is panels.settings.FMQM_PT_presets else getattr(cls, "bl_label", "")
+        )  # Blender writes into that one
         assert all(word in small or not word[0].islower() for word in label.split()), label
         if issubclass(cls, bpy.types.Operator):
             description = getattr(cls, "bl_description", "")

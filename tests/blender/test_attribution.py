@@ -11,7 +11,6 @@ from unittest.mock import MagicMock
 import bpy
 import numpy as np
 import pytest
-from fmqm_addon.ui.properties.settings.settings import row_attribution
 
 import fmqm_addon
 from fmqm_addon import api
@@ -25,6 +24,7 @@ from fmqm_addon.metric.settings import PRESETS, Settings
 from fmqm_addon.metric.surface import MeshArrays
 from fmqm_addon.ui.operators import inputs
 from fmqm_addon.ui.panels import results as panels
+from fmqm_addon.ui.properties.rows import row_attribution
 
 from . import scenes
 from .script import noise, read_json, score, strict_json, write_png, write_torus

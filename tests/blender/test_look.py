@@ -25,8 +25,8 @@ from fmqm_addon.metric.sampling import Samples
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.report.visual import colormap, layers, probe
 from fmqm_addon.ui import session
-from fmqm_addon.ui.view import cloud as show
-from fmqm_addon.ui.view import overlay
+from fmqm_addon.ui.view import cloud, overlay, shown, slice_plane
+from fmqm_addon.ui.view.result import measured_row
 
 from . import scenes
 
@@ -329,9 +329,9 @@ def test_slice_shows_the_field_where_it_is(scene: bpy.types.Scene, measured: ses
     first = pixels()
     plane.location.z += 0.5
     bpy.context.view_layer.update()
-    assert show.slice_has_moved(scene)
-    show.draw_slice(scene)
-    assert not show.slice_has_moved(scene) and (pixels() != first).any()
+    assert slice_plane.slice_has_moved(scene)
+    slice_plane.draw_slice(scene)
+    assert not slice_plane.slice_has_moved(scene) and (pixels() != first).any()
 
 
 def test_cloud_follows_the_chosen_row(scene: bpy.types.Scene, measured: session.Measured) -> None:
@@ -416,8 +416,8 @@ def test_each_scene_shows_its_own(scene: bpy.types.Scene, measured: session.Meas
     mine = [scene_objects.find_object(scene, kind) for kind in SHOWN]
     two = bpy.data.scenes.new("Two")
     add_row(two, measured, "Other")
-    show.show_cloud(two)
-    show.show_slice(two)
+    cloud.show_cloud(two)
+    slice_plane.show_slice(two)
     assert [scene_objects.find_object(scene, kind) for kind in SHOWN] == mine and subtitle(SHOWN[0]) == "Monkey_LOD1"
     theirs = list(scene_objects.objects(two))
     assert len(theirs) == 2 and not set(theirs) & set(mine)
@@ -467,7 +467,7 @@ def test_slice_is_in_the_saved_file(scene: bpy.types.Scene, tmp_path: Path) -> N
     for height in (0.0, 0.3):  # a picture that was packed can be drawn again
         scene_objects.find_object(scene, scene_objects.SLICE).location.z = height
         bpy.context.view_layer.update()
-        show.draw_slice(scene)
+        slice_plane.draw_slice(scene)
         before = pixels()
         path = str(tmp_path / f"{height}.blend")
         bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
@@ -490,19 +490,19 @@ def test_undo_takes_the_views_colors_along(scene: bpy.types.Scene) -> None:
     view = next(s for screen in bpy.data.screens for a in screen.areas for s in a.spaces if s.type == "VIEW_3D")
     before = view.shading.color_type
     bpy.ops.fmqm.slice()
-    show.settle_colors()
+    shown.settle_colors()
     assert view.shading.color_type == before  # a slice needs no other colors
     bpy.ops.fmqm.look()
     view.shading.color_type = "RANDOM"
-    show.settle_colors()
+    shown.settle_colors()
     assert view.shading.color_type == "RANDOM"  # the user's choice
     view.shading.color_type = "VERTEX"
     scene_objects.clear()  # as undo would
-    show.settle_colors()
+    shown.settle_colors()
     assert view.shading.color_type == before and not viewport.colors_changed()
-    show.show_cloud(scene)
+    cloud.show_cloud(scene)
     viewport.restore_colors()
-    show.settle_colors()  # after redo
+    shown.settle_colors()  # after redo
     assert view.shading.color_type == "VERTEX"
 
 
@@ -532,7 +532,7 @@ def test_without_samples_it_says_measure_again(scene: bpy.types.Scene) -> None:
     assert (point_colors() == before).all()
     assert not bpy.ops.fmqm.look.poll() and not bpy.ops.fmqm.slice.poll()
     with pytest.raises(fmqm_addon.metric.errors.FMQMError, match="press Measure Quality again"):
-        show.measured_row(scene)
+        measured_row(scene)
     assert bpy.ops.fmqm.clear() == {"FINISHED"}
 
 

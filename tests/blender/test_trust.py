@@ -12,7 +12,6 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
-from fmqm_addon.ui.properties.settings.settings import row_reverse, row_trust
 
 import fmqm_addon
 from fmqm_addon import api
@@ -23,8 +22,8 @@ from fmqm_addon.metric.evaluation import COLUMNS
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.surface import MeshArrays
 from fmqm_addon.report.trust_table import trust_dict
-from fmqm_addon.ui.operators.results import pair_of
-from fmqm_addon.ui.panels import results as panels
+from fmqm_addon.ui.panels import trust as panels
+from fmqm_addon.ui.properties.rows import pair_of, row_reverse, row_trust
 
 from . import scenes
 

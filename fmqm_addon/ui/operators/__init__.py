@@ -1,2 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The sidebar's buttons."""
+
+from . import decimate, inputs, measure, pick, presets, results, save, view
+
+CLASSES: tuple[type, ...] = (
+    *inputs.CLASSES,
+    *measure.CLASSES,
+    *presets.CLASSES,
+    *results.CLASSES,
+    *save.CLASSES,
+    *view.CLASSES,
+    *pick.CLASSES,
+    *decimate.CLASSES,
+)

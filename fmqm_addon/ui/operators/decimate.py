@@ -6,10 +6,8 @@ from __future__ import annotations
 from typing import ClassVar
 
 import bpy
-from bpy.props import BoolProperty, FloatProperty, IntProperty, StringProperty
 
 from ...blender.scene.decimate import (
-    LEAST_TRIANGLES,
     Found,
     Reader,
     Reduced,
@@ -25,30 +23,8 @@ from ...metric.score import Stepper, Work
 from ...metric.settings import Settings
 from .. import session
 from ..modal import SteppedOperator
+from ..properties.decimate import FMQMDecimate
 from ..properties.settings import metric_settings
-
-
-class FMQMDecimate(bpy.types.PropertyGroup):
-    """What is searched for, and how the last search went."""
-
-    target: FloatProperty(
-        name="Target FMQM",
-        description="The copy scores at least this much against the original",
-        default=0.9,
-        min=0.01,
-        max=1.0,
-        precision=2,
-        step=1,
-    )
-    limited: BoolProperty(
-        name="Limit Triangles", description="Never more triangles than this, even if the target is missed then"
-    )
-    max_triangles: IntProperty(
-        name="Max Triangles", description="The most triangles of the copy", default=10_000, min=LEAST_TRIANGLES
-    )
-    path: StringProperty(name="Path", description="Versions that were scored, one a line")
-    path_of: StringProperty(name="Path Of", description="Object whose versions they are")
-    found: IntProperty(name="Found", description="Line of the version that was chosen; -1: none", default=-1, min=-1)
 
 
 class FMQM_OT_decimate(SteppedOperator, bpy.types.Operator):  # noqa: N801
@@ -165,34 +141,4 @@ def _step_text(step: Step) -> str:
     return f"{step.triangles:,} triangles: {'about ' if step.quick else ''}{score}"
 
 
-class FMQM_PT_decimate(bpy.types.Panel):  # noqa: N801
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "FMQM"
-    bl_parent_id = "FMQM_PT_main"
-    bl_idname = "FMQM_PT_decimate"
-    bl_label = "Decimate to Quality"
-    bl_options: ClassVar = {"DEFAULT_CLOSED"}
-    bl_order = 6
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout, decimate = self.layout, context.scene.fmqm.decimate
-        layout.use_property_split, layout.use_property_decorate = True, False
-        layout.prop(decimate, "target", slider=True)
-        row = layout.row(heading="Max Triangles")
-        row.prop(decimate, "limited", text="")
-        number = row.row()
-        number.active = decimate.limited
-        number.prop(decimate, "max_triangles", text="")
-        row = layout.row()
-        row.operator_context = "INVOKE_DEFAULT"
-        row.operator(FMQM_OT_decimate.bl_idname, icon="MOD_DECIM")
-        if decimate.path:
-            column = layout.column(align=True)
-            column.scale_y = 0.8
-            column.label(text=decimate.path_of, icon="OBJECT_DATA", translate=False)
-            for number, line in enumerate(decimate.path.splitlines()):
-                column.label(text=line, icon="CHECKMARK" if number == decimate.found else "BLANK1", translate=False)
-
-
-CLASSES = (FMQM_OT_decimate, FMQM_PT_decimate)
+CLASSES = (FMQM_OT_decimate,)

@@ -9,8 +9,8 @@ from typing import ClassVar
 import bpy
 
 from ...blender.scene.lods import find_lods
+from ..properties.items import is_asset, kept
 from ..properties.scene import FMQMScene
-from ..properties.settings import is_asset, kept
 
 
 def _selected_assets(context: bpy.types.Context) -> list[bpy.types.Object]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The measuring button: modal, cancellable; and the presets of its settings."""
+"""The measuring button: works between redraws of the window and can be cancelled."""
 
 from __future__ import annotations
 
@@ -9,18 +9,19 @@ from typing import ClassVar
 
 import bpy
 import numpy as np
-from bl_operators.presets import AddPresetBase
 
 from ...blender.scene.measure import Outcome, measuring
-from ...blender.scene.target import Target, target_of
+from ...blender.scene.target import target_of
 from ...comparison.pair import Question
 from ...metric.errors import FMQMError
 from ...metric.score import Stepper
 from ...report.trust_table import trust_dict
 from .. import session, stale
 from ..modal import SteppedOperator
+from ..properties.items import item_target
+from ..properties.rows import numbers_text, row_targets
 from ..properties.scene import FMQMScene
-from ..properties.settings import PRESET_PROPERTIES, FMQMRow, item_target, metric_settings, numbers_text
+from ..properties.settings import metric_settings
 from .inputs import reference_of
 
 
@@ -117,14 +118,10 @@ class FMQM_OT_cancel(bpy.types.Operator):  # noqa: N801
         return {"FINISHED"}
 
 
-def _row_key(row: FMQMRow) -> tuple[Target, Target]:
-    return stale.row_targets(row)
-
-
 def _write_row(fmqm: FMQMScene, outcome: Outcome, settings_text: str) -> None:
     """Replaces the row of the same two assets, or adds one. Scores of what has been deleted meanwhile stay."""
     key = (outcome.reference_target, outcome.target)
-    row = next((row for row in fmqm.rows if _row_key(row) == key), None)
+    row = next((row for row in fmqm.rows if row_targets(row) == key), None)
     if row is not None and row.scores and outcome.error and any(target.is_gone() for target in key):
         return
     row = row or fmqm.rows.add()
@@ -164,18 +161,7 @@ def _write_row(fmqm: FMQMScene, outcome: Outcome, settings_text: str) -> None:
 
 def _choose_row(fmqm: FMQMScene, outcome: Outcome) -> None:
     key = (outcome.reference_target, outcome.target)
-    fmqm.row_index = next((index for index, row in enumerate(fmqm.rows) if _row_key(row) == key), 0)
-
-
-class FMQM_OT_preset_add(AddPresetBase, bpy.types.Operator):  # noqa: N801
-    bl_idname = "fmqm.preset_add"
-    bl_label = "Add Measuring Preset"
-    bl_description = "Save these settings as a preset, or remove the chosen one"
-    bl_options: ClassVar = {"INTERNAL"}
-    preset_menu = "FMQM_PT_presets"
-    preset_defines: ClassVar = ["settings = bpy.context.scene.fmqm.settings"]
-    preset_values: ClassVar = [f"settings.{name}" for name in PRESET_PROPERTIES]
-    preset_subdir = "fmqm"
+    fmqm.row_index = next((index for index, row in enumerate(fmqm.rows) if row_targets(row) == key), 0)
 
 
 def _draw_in_object_menu(self: bpy.types.Menu, _: bpy.types.Context) -> None:
@@ -184,7 +170,7 @@ def _draw_in_object_menu(self: bpy.types.Menu, _: bpy.types.Context) -> None:
     self.layout.operator(FMQM_OT_measure.bl_idname, text="Measure Quality (FMQM)")
 
 
-CLASSES = (FMQM_OT_measure, FMQM_OT_cancel, FMQM_OT_preset_add)
+CLASSES = (FMQM_OT_measure, FMQM_OT_cancel)
 
 
 def register() -> None:

@@ -1,95 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Buttons of the results: sort, remove, copy, save."""
+"""Buttons of the results: sort, remove, copy."""
 
 from __future__ import annotations
 
-import json
-import os
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import bpy
-from bpy.props import EnumProperty, StringProperty
+from bpy.props import EnumProperty
 
-from ... import VERSION
-from ...metric.errors import FMQMError
-from ...metric.score import COLUMNS
-from ...metric.settings import PRESETS, SETTING_NAMES, Settings
-from ...metric.spatial import Floats
-from ...report.atomic_files import write_text
-from ...report.npz import save_fields
-from ...report.records import SHOWN, PairScore, csv_text, json_text, table_text
-from .. import session, stale
-from ..properties.settings import FMQMRow, active_row, row_attribution, row_reverse, row_scores, row_stderr, row_trust
-
-# What an artist should know of each number: label, and what a low value looks like.
-EXPLAINED = {
-    "FMQM": ("FMQM", "The whole score, 0 to 1: mean over all patches. 1 is the same as the reference"),
-    "geoSSIM": (
-        "Shape",
-        "geoSSIM: distances to the surface. Low where the surface has moved, shrunk or lost its bumps",
-    ),
-    "geoGraSSIM": (
-        "Direction",
-        "geoGraSSIM: directions to the surface. Low where it is bent or faceted, so that its normals point elsewhere",
-    ),
-    "colorSSIM": (
-        "Color",
-        "colorSSIM: colors around a point. Low where the texture is blurred, shifted, tinted or compressed",
-    ),
-    "colorGraSSIM": (
-        "Color Edges",
-        "colorGraSSIM: the steepest color changes. Low where edges in the texture have moved, softened or broken up",
-    ),
-}
-assert set(EXPLAINED) == set(SHOWN)
+from ...report.records import table_text
+from ..properties.rows import EXPLAINED, active_row, pair_of, row_scores
 
 
-def settings_name(row: FMQMRow) -> str:
-    """The preset that a row was measured with, or Custom."""
-    used = _settings_that_count(row)
-    for name, values in PRESETS.items():
-        preset = Settings(**values).as_dict()
-        if all(preset[each] == value for each, value in used.items()):
-            return name.capitalize()
-    return "Custom"
-
-
-def comparable(row: FMQMRow, other: FMQMRow) -> bool:
-    """Whether the scores of two rows may be compared: they were measured at equal settings."""
-    return row.settings == other.settings or _settings_that_count(row) == _settings_that_count(other)
-
-
-def _settings_that_count(row: FMQMRow) -> dict[str, Any]:
-    used = json.loads(row.settings)
-    return {name: used[name] for name in SETTING_NAMES if name != "seed"}
-
-
-def pair_of(row: FMQMRow) -> PairScore:
-    """A row as the reports want it."""
-    reference, target = stale.row_targets(row)
-    attribution = row_attribution(row)
-    return PairScore(
-        reference=reference.label,
-        distorted=target.label,
-        scores=_scores(row_scores(row)),
-        stderr=_scores(row_stderr(row)),
-        patches=row.patches or None,
-        samples=row.samples or None,
-        seconds=json.loads(row.stages or "{}"),
-        warnings=tuple(row.warnings.splitlines()),
-        error=row.error or None,
-        space=row.space or None,
-        reverse=_scores(row_reverse(row)),
-        trust=row_trust(row),
-        findings={} if attribution is None else {"attribution": attribution},
-    )
-
-
-def _scores(columns: dict[str, float] | None) -> Scores | None:
-    return None if columns is None else Scores(**columns)
-
-
-def _has_rows(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+def has_rows(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     if not context.scene.fmqm.rows:
         cls.poll_message_set("Nothing has been measured yet")
         return False
@@ -113,7 +36,7 @@ class FMQM_OT_sort_rows(bpy.types.Operator):  # noqa: N801
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return _has_rows(cls, context)
+        return has_rows(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         fmqm = context.scene.fmqm
@@ -139,7 +62,7 @@ class FMQM_OT_remove_row(bpy.types.Operator):  # noqa: N801
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return _has_rows(cls, context)
+        return has_rows(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         fmqm = context.scene.fmqm
@@ -156,7 +79,7 @@ class FMQM_OT_clear_results(bpy.types.Operator):  # noqa: N801
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return _has_rows(cls, context)
+        return has_rows(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         # The fields stay in the session's memory: undo brings the rows back.
@@ -173,7 +96,7 @@ class FMQM_OT_copy_results(bpy.types.Operator):  # noqa: N801
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return _has_rows(cls, context)
+        return has_rows(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         context.window_manager.clipboard = table_text([pair_of(row) for row in context.scene.fmqm.rows])
@@ -182,84 +105,4 @@ class FMQM_OT_copy_results(bpy.types.Operator):  # noqa: N801
         return {"FINISHED"}
 
 
-class FMQM_OT_save_results(bpy.types.Operator):  # noqa: N801
-    bl_idname = "fmqm.save_results"
-    bl_label = "Save Results"
-    bl_options: ClassVar = {"INTERNAL"}  # writes a file, changes nothing in the scene
-
-    file_format: EnumProperty(
-        name="Format",
-        description="What is saved",
-        items=[
-            ("json", "JSON", "Scores in full precision, with settings, times, warnings and trust reports"),
-            ("csv", "CSV", "One row per result, for spreadsheets"),
-            ("npz", "NPZ", "Samples, fields and patch scores of the chosen result, for numpy"),
-        ],
-    )
-    filepath: StringProperty(name="File Path", description="File to write", subtype="FILE_PATH")
-    filter_glob: StringProperty(name="Filter", description="Files that are shown", options={"HIDDEN"})
-    check_existing: bpy.props.BoolProperty(
-        name="Check Existing", description="Warn before a file is overwritten", default=True, options={"HIDDEN"}
-    )
-
-    @classmethod
-    def description(cls, _: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
-        return str(properties.bl_rna.properties["file_format"].enum_items[properties.file_format].description)
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return _has_rows(cls, context)
-
-    def invoke(self, context: bpy.types.Context, _: bpy.types.Event) -> set[str]:
-        folder = os.path.dirname(bpy.data.filepath) or os.path.expanduser("~")
-        self.filepath = os.path.join(folder, f"fmqm.{self.file_format}")
-        self.filter_glob = f"*.{self.file_format}"
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
-
-    def check(self, _: bpy.types.Context) -> bool:
-        wanted = self._with_suffix()
-        changed = wanted != self.filepath
-        self.filepath = wanted
-        return changed
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        if not os.path.basename(self.filepath):
-            self.report({"ERROR"}, "No file is named; say which one to write to")
-            return {"CANCELLED"}
-        fmqm = context.scene.fmqm
-        row = active_row(context.scene) or fmqm.rows[0]
-        path = bpy.path.abspath(self._with_suffix())
-        # One file tells of one set of settings: scores at others do not compare.
-        rows = [other for other in fmqm.rows if other.settings == row.settings]
-        try:
-            if self.file_format == "npz":
-                measured = session.get(row.uid)
-                if measured is None:
-                    raise FMQMError(f"{row.name}: the samples are not in memory any more; measure again")
-                save_fields(path, measured.comparison.result)
-            elif self.file_format == "csv":
-                write_text(path, csv_text([pair_of(other) for other in rows]))
-            else:
-                versions = {"fmqm_version": VERSION, "blender_version": bpy.app.version_string}
-                write_text(path, json_text([pair_of(other) for other in rows], json.loads(row.settings), versions))
-        except FMQMError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        left_out = len(fmqm.rows) - len(rows)
-        tail = f"; {left_out} measured with other settings left out" if left_out and self.file_format != "npz" else ""
-        self.report({"INFO"}, f"Saved {os.path.basename(path)}{tail}")
-        return {"FINISHED"}
-
-    def _with_suffix(self) -> str:
-        suffix = f".{self.file_format}"
-        return self.filepath if self.filepath.lower().endswith(suffix) else self.filepath + suffix
-
-
-CLASSES = (
-    FMQM_OT_sort_rows,
-    FMQM_OT_remove_row,
-    FMQM_OT_clear_results,
-    FMQM_OT_copy_results,
-    FMQM_OT_save_results,
-)
+CLASSES = (FMQM_OT_sort_rows, FMQM_OT_remove_row, FMQM_OT_clear_results, FMQM_OT_copy_results)

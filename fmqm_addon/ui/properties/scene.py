@@ -4,19 +4,19 @@
 from __future__ import annotations
 
 import bpy
-from bpy.props import BoolProperty, CollectionProperty, EnumProperty, IntProperty, PointerProperty
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    IntProperty,
+    PointerProperty,
+)
 
-from ..operators.decimate import FMQMDecimate
-from ..operators.view import FMQMLook, row_chosen
-from .settings import FMQMItem, FMQMRow, FMQMSettings, is_asset
-
-
-def _can_be_picked(_: FMQMScene, object_: bpy.types.Object) -> bool:
-    return is_asset(object_)
-
-
-def _row_chosen(self: FMQMScene, _: bpy.types.Context) -> None:
-    row_chosen(self.id_data)
+from .decimate import FMQMDecimate
+from .items import FMQMItem, can_be_picked
+from .rows import FMQMRow
+from .settings import FMQMSettings
+from .view import FMQMLook, notify
 
 
 class FMQMScene(bpy.types.PropertyGroup):
@@ -34,7 +34,7 @@ class FMQMScene(bpy.types.PropertyGroup):
         name="Reference",
         description="The original. An empty stands for all below it",
         type=bpy.types.Object,
-        poll=_can_be_picked,
+        poll=can_be_picked,
     )
     reference_collection: PointerProperty(
         name="Reference Collection",
@@ -52,7 +52,7 @@ class FMQMScene(bpy.types.PropertyGroup):
     settings: PointerProperty(name="Settings", description="How it is measured", type=FMQMSettings)
     rows: CollectionProperty(name="Results", description="One row per compared object", type=FMQMRow)
     row_index: IntProperty(
-        name="Active Result", description="Chosen row of the results", default=0, min=0, update=_row_chosen
+        name="Active Result", description="Chosen row of the results", default=0, min=0, update=notify("row_index")
     )
     look: PointerProperty(name="Look", description="What of the chosen result is shown", type=FMQMLook)
     decimate: PointerProperty(

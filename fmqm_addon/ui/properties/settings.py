@@ -1,133 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the add-on stores in the scene: inputs, settings, result rows."""
+"""The settings: every option of the metric and of how two objects are compared."""
 
 from __future__ import annotations
 
-import json
 import math
 from typing import Any
 
 import bpy
 import numpy as np
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
+from bpy.props import (
+    BoolProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+)
 
-from ...blender.scene.members import is_measured
 from ...comparison.alignment import SPACES
-from ...metric.score import COLUMNS
 from ...metric.settings import FAST_SCORED_PATCHES, SETTING_NAMES, Settings
-from ...report.trust_table import Report
 
 SEED_LIMIT = 2**31 - 1  # of an IntProperty
 CUSTOM = "CUSTOM"
-
-
-def is_asset(object_: bpy.types.Object) -> bool:
-    """Whether an object can be measured: it may show a surface, or it is an empty and stands for what hangs from it."""
-    return object_.type == "EMPTY" or is_measured(object_)
-
-
-def _can_be_picked(_: Any, object_: bpy.types.Object) -> bool:
-    return is_asset(object_)
-
-
-class FMQMItem(bpy.types.PropertyGroup):
-    """One asset to compare: an object or a collection."""
-
-    object: PointerProperty(
-        name="Object",
-        description="Mesh, curve, surface, text or metaball, or an empty, below which all counts as one object",
-        type=bpy.types.Object,
-        poll=_can_be_picked,
-    )
-    collection: PointerProperty(
-        name="Collection", description="Collection whose objects count as one", type=bpy.types.Collection
-    )
-
-
-def kept(object_: bpy.types.Object | None) -> bpy.types.Object | None:
-    """None for an object that was deleted: it stays in the file, in no scene, as long as a property points at it.
-
-    Cheap: panels ask at each redraw.
-    """
-    if object_ is None or bpy.context.view_layer.objects.get(object_.name) == object_:
-        return object_
-    return object_ if object_.users_scene else None  # which goes through all objects
-
-
-def item_target(item: FMQMItem) -> bpy.types.Object | bpy.types.Collection | None:
-    """What an item stands for; None if that was deleted."""
-    return kept(item.object) or item.collection
-
-
-class FMQMRow(bpy.types.PropertyGroup):
-    """One result. Scores are text, because a FloatProperty has only single precision."""
-
-    name: StringProperty(name="Name", description="Object or collection that was compared")
-    uid: StringProperty(name="Identifier", description="Key of the fields that this Blender session remembers")
-    reference_name: StringProperty(name="Reference", description="What it was compared with")
-    kind: StringProperty(name="Kind", description="Whether it is an object or a collection")
-    reference_kind: StringProperty(name="Reference Kind", description="Whether the reference is one or the other")
-    bare_reference: BoolProperty(name="Bare Reference", description="The reference was measured without modifiers")
-    scores: StringProperty(name="Scores", description="The five scores in double precision, as JSON")
-    stderr: StringProperty(name="Standard Errors", description="Of the scores, as JSON; empty for one seed")
-    triangles: IntProperty(name="Triangles", description="Triangles of the compared object", min=0)
-    share: FloatProperty(
-        name="Share", description="Its triangles by those of the reference", min=0.0, subtype="PERCENTAGE"
-    )
-    patches: IntProperty(name="Patches", description="Patches that were scored", min=0)
-    samples: IntProperty(name="Samples", description="Samples that were drawn", min=0)
-    seconds: FloatProperty(name="Seconds", description="Time that the comparison took", min=0.0, unit="TIME_ABSOLUTE")
-    stages: StringProperty(name="Stages", description="Seconds by stage, as JSON")
-    warnings: StringProperty(name="Warnings", description="What to know before believing the score, one a line")
-    error: StringProperty(name="Error", description="Why there is no score")
-    space: StringProperty(name="Space", description="Where the two were compared")
-    settings: StringProperty(name="Settings", description="Settings of the measurement, as JSON")
-    reverse: StringProperty(name="Reverse", description="Scores of the other direction, as JSON; empty: not measured")
-    attribution: StringProperty(name="Attribution", description="Whose loss it is, as JSON; empty: not measured")
-    trust: StringProperty(name="Trust", description="How far to trust the scores: facts with their units, as JSON")
-    fingerprint: StringProperty(name="Fingerprint", description="Tells whether what was measured has changed since")
-
-
-def active_row(scene: bpy.types.Scene) -> FMQMRow | None:
-    """The chosen row of a scene's results."""
-    rows, index = scene.fmqm.rows, scene.fmqm.row_index
-    return rows[index] if 0 <= index < len(rows) else None
-
-
-def row_scores(row: FMQMRow) -> dict[str, float] | None:
-    """The five scores by the names of metric.evaluation.COLUMNS, in double precision; None for a row with an error."""
-    return _columns(row.scores)
-
-
-def row_stderr(row: FMQMRow) -> dict[str, float] | None:
-    """Standard errors of the scores over the seeds; None for one seed."""
-    return _columns(row.stderr)
-
-
-def row_reverse(row: FMQMRow) -> dict[str, float] | None:
-    """Scores of the other direction, the compared as the reference; None where they were not measured."""
-    return _columns(row.reverse)
-
-
-def row_attribution(row: FMQMRow) -> dict[str, Any] | None:
-    """Whose loss it is, as comparison.attribution.Attribution.as_dict has it; None where that was not measured."""
-    found: dict[str, Any] | None = json.loads(row.attribution) if row.attribution else None
-    return found
-
-
-def row_trust(row: FMQMRow) -> Report | None:
-    """The trust report of a row; None for a row with an error."""
-    report: Report | None = json.loads(row.trust) if row.trust else None
-    return report
-
-
-def numbers_text(values: Any) -> str:
-    """Doubles as the text that row_scores reads back bit by bit."""
-    return json.dumps(np.asarray(values, np.float64).tolist())
-
-
-def _columns(text: str) -> dict[str, float] | None:
-    return dict(zip(COLUMNS, json.loads(text), strict=True)) if text else None
 
 
 def _preset_chosen(settings: FMQMSettings, _: bpy.types.Context) -> None:
@@ -321,4 +213,4 @@ def metric_settings(settings: FMQMSettings) -> Settings:
     return Settings(**values)
 
 
-CLASSES = (FMQMItem, FMQMRow, FMQMSettings)
+CLASSES = (FMQMSettings,)

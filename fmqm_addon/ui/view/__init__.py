@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What of a result stands in the 3D view."""
+"""What of a result is shown in the 3D view."""

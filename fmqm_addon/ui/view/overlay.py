@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ...blender.display import scene_objects
 from ...metric.spatial import Floats
 from .. import session
-from ..properties.settings import active_row
+from ..properties.rows import active_row
 
 LEGEND = "fmqm_legend"  # custom property of the objects that have a legend: report.visual.layers.Legend as JSON
 _FONT = 0

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The sub-panel of Decimate to Quality."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import bpy
+
+from ..operators.decimate import FMQM_OT_decimate
+from .sidebar import Sidebar
+
+
+class FMQM_PT_decimate(Sidebar, bpy.types.Panel):  # noqa: N801
+    bl_parent_id = "FMQM_PT_main"
+    bl_idname = "FMQM_PT_decimate"
+    bl_label = "Decimate to Quality"
+    bl_options: ClassVar = {"DEFAULT_CLOSED"}
+    bl_order = 6
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, decimate = self.layout, context.scene.fmqm.decimate
+        layout.use_property_split, layout.use_property_decorate = True, False
+        layout.prop(decimate, "target", slider=True)
+        row = layout.row(heading="Max Triangles")
+        row.prop(decimate, "limited", text="")
+        number = row.row()
+        number.active = decimate.limited
+        number.prop(decimate, "max_triangles", text="")
+        row = layout.row()
+        row.operator_context = "INVOKE_DEFAULT"
+        row.operator(FMQM_OT_decimate.bl_idname, icon="MOD_DECIM")
+        if decimate.path:
+            column = layout.column(align=True)
+            column.scale_y = 0.8
+            column.label(text=decimate.path_of, icon="OBJECT_DATA", translate=False)
+            for number, line in enumerate(decimate.path.splitlines()):
+                column.label(text=line, icon="CHECKMARK" if number == decimate.found else "BLANK1", translate=False)
+
+
+CLASSES = (FMQM_PT_decimate,)

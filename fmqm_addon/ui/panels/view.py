@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The sub-panels that show a result in the 3D view: Look, Worst Places, NCF Debugging."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from .. import session
+from ..operators.pick import FMQM_OT_unit_pick
+from ..operators.view import (
+    FMQM_OT_clear,
+    FMQM_OT_look,
+    FMQM_OT_paint_surface,
+    FMQM_OT_shells,
+    FMQM_OT_slice,
+    FMQM_OT_unit_step,
+    FMQM_OT_worst_all,
+    FMQM_OT_worst_step,
+)
+from ..properties.rows import active_row
+from ..view.result import look_of
+from .sidebar import Sidebar
+
+PARENT = "FMQM_PT_main"
+
+
+class FMQM_UL_worst(bpy.types.UIList):  # noqa: N801
+    def draw_item(  # Blender counts the arguments
+        self, _context: Any, layout: Any, _data: Any, item: Any, _icon: int, _active: Any, _property: str
+    ) -> None:
+        split = layout.split(factor=0.24)
+        split.label(text=f"{item.score:.3f}")
+        split = split.split(factor=0.72)
+        split.label(text=item.blame)
+        split.label(text=f"#{item.patch}")
+
+    def draw_filter(self, _context: bpy.types.Context, _layout: Any) -> None:
+        """Twenty rows in their order need no filter."""
+
+
+class FMQM_PT_look(Sidebar, bpy.types.Panel):  # noqa: N801
+    bl_parent_id = PARENT
+    bl_idname = "FMQM_PT_look"
+    bl_label = "Look"
+    bl_order = 3
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, look = self.layout, look_of(context.scene)
+        layout.use_property_split, layout.use_property_decorate = True, False
+        _say_if_gone(layout, context)
+        column = layout.column()
+        column.prop(look, "layer")
+        column.row().prop(look, "range", expand=True)
+        column.row().prop(look, "place", expand=True)
+        column.prop(look, "point_size", slider=True)
+        column = layout.column(align=True)
+        column.operator(FMQM_OT_look.bl_idname, icon="POINTCLOUD_DATA")
+        column.operator(FMQM_OT_paint_surface.bl_idname, icon="BRUSH_DATA")
+        layout.operator(FMQM_OT_clear.bl_idname, icon="TRASH")
+
+
+class FMQM_PT_worst(Sidebar, bpy.types.Panel):  # noqa: N801
+    bl_parent_id = PARENT
+    bl_idname = "FMQM_PT_worst"
+    bl_label = "Worst Places"
+    bl_order = 4
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, look = self.layout, look_of(context.scene)
+        if len(look.worst):
+            layout.template_list("FMQM_UL_worst", "", look, "worst", look, "worst_index", rows=4, maxrows=8)
+        row = layout.row(align=True)
+        row.operator(FMQM_OT_worst_step.bl_idname, text="Previous", icon="TRIA_LEFT").step = -1
+        row.operator(FMQM_OT_worst_step.bl_idname, text="Next", icon="TRIA_RIGHT").step = 1
+        layout.operator(FMQM_OT_worst_all.bl_idname)
+
+
+class FMQM_PT_ncf(Sidebar, bpy.types.Panel):  # noqa: N801
+    bl_parent_id = PARENT
+    bl_idname = "FMQM_PT_ncf"
+    bl_label = "NCF Debugging"
+    bl_order = 5
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, look = self.layout, look_of(context.scene)
+        layout.use_property_split, layout.use_property_decorate = True, False
+        column = layout.column(align=True)
+        column.label(text="Units of One Sample")
+        column.operator(FMQM_OT_unit_pick.bl_idname, icon="EYEDROPPER")
+        row = column.row(align=True)
+        row.operator(FMQM_OT_unit_step.bl_idname, text="Previous", icon="TRIA_LEFT").step = -1
+        row.operator(FMQM_OT_unit_step.bl_idname, text="Next", icon="TRIA_RIGHT").step = 1
+        column = layout.column()
+        column.label(text="Slice")
+        column.prop(look, "slice_layer")
+        column.prop(look, "slice_resolution")
+        column.operator(FMQM_OT_slice.bl_idname, icon="MESH_PLANE")
+        column = layout.column()
+        column.label(text="Shells")
+        column.row().prop(look, "shell_field", expand=True)
+        column.row().prop(look, "shell_layout", expand=True)
+        column.prop(look, "shell_distance")
+        column.prop(look, "shell_points")
+        column.operator(FMQM_OT_shells.bl_idname, icon="MOD_THICKNESS")
+
+
+def _say_if_gone(layout: Any, context: bpy.types.Context) -> None:
+    row = active_row(context.scene)
+    if row is not None and not row.error and session.get(row.uid) is None:
+        layout.label(text="Samples are gone: Measure Again", icon="INFO")
+
+
+CLASSES: tuple[type, ...] = (FMQM_UL_worst, FMQM_PT_look, FMQM_PT_worst, FMQM_PT_ncf)

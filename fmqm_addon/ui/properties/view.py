@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What of the chosen result is shown, and how."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    StringProperty,
+)
+
+from ...report.visual import layers
+
+Notified = Callable[[bpy.types.Scene, str, bpy.types.Context], None]
+on_change: Notified | None = None  # is told the scene and the property's name; view.updates sets it
+_LAYER_ITEMS = [(layer.name, layer.label, layer.description) for layer in layers.LAYERS.values()]
+_FIELD_ITEMS = [item for item in _LAYER_ITEMS if not layers.LAYERS[item[0]].per_patch]
+
+
+def notify(name: str) -> Callable[[bpy.types.PropertyGroup, bpy.types.Context], None]:
+    """The update function of a property on which what is shown depends."""
+
+    def update(group: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+        if on_change is not None:
+            on_change(group.id_data, name, context)
+
+    return update
+
+
+class FMQMWorstPatch(bpy.types.PropertyGroup):
+    """One of the lowest patches of the row that is shown."""
+
+    name: StringProperty(name="Name", description="Number of the patch")
+    patch: IntProperty(name="Patch", description="Number of the patch", min=0)
+    score: FloatProperty(name="FMQM", description="Score of the patch", min=0.0, max=1.0)
+    blame: StringProperty(name="To Blame", description="Feature that falls furthest below its mean over all patches")
+    value: FloatProperty(name="Value", description="That feature in this patch", min=0.0, max=1.0)
+
+
+class FMQMLook(bpy.types.PropertyGroup):
+    """What of the chosen result is shown, and how."""
+
+    layer: EnumProperty(
+        name="Color By", description="What the colors of the points mean", items=_LAYER_ITEMS, update=notify("layer")
+    )
+    range: EnumProperty(
+        name="Range",
+        description="Which values the ends of the color map stand for",
+        items=[
+            ("FIXED", "Fixed", "0 to 1 for scores and colors; 1 or 2 % of the reference's size for distances"),
+            ("FITTED", "Fitted", "The values that occur, so that small differences show"),
+        ],
+        update=notify("range"),
+    )
+    place: EnumProperty(
+        name="Place",
+        description="Where the points are shown",
+        items=[
+            ("REFERENCE", "Reference", "Where the reference stands"),
+            ("COMPARED", "Compared", "Where the compared object stands"),
+        ],
+        update=notify("place"),
+    )
+    point_size: FloatProperty(
+        name="Point Size",
+        description="Radius of a point, by the radius at which neighbors just touch",
+        default=1.0, min=0.05, max=10.0, soft_min=0.2, soft_max=3.0, step=5, precision=2, subtype="FACTOR",
+        update=notify("point_size"),
+    )  # fmt: skip
+    worst: CollectionProperty(name="Worst Places", description="The patches of the lowest FMQM", type=FMQMWorstPatch)
+    worst_index: IntProperty(
+        name="Worst Place",
+        description="Frames this patch and shows only its points",
+        min=0,
+        update=notify("worst_index"),
+    )
+    worst_uid: StringProperty(name="Row", description="Which result the worst places belong to")
+    focused: BoolProperty(name="One Patch Only", description="Only one patch is shown", default=False)
+    shell_field: EnumProperty(
+        name="Surface",
+        description="Whose colors the shells show",
+        items=[
+            ("REFERENCE", "Reference", "Colors of the reference around it"),
+            ("COMPARED", "Compared", "Colors of the compared object around it"),
+        ],
+    )
+    shell_layout: EnumProperty(
+        name="Layout",
+        description="How the five shells are arranged",
+        items=[
+            ("PEELED", "Peeled", "Around the surface, each one ending before the one below it"),
+            ("ROW", "In a Row", "Side by side, as in the paper's figure"),
+        ],
+    )
+    shell_distance: FloatProperty(
+        name="Distance",
+        description="Between two shells, in percent of the reference's size",
+        default=2.0, min=0.001, max=100.0, soft_max=10.0, step=10, precision=2, subtype="PERCENTAGE",
+    )  # fmt: skip
+    shell_points: IntProperty(
+        name="Points", description="Points of each shell", default=30_000, min=100, max=2_000_000, soft_max=200_000
+    )
+    unit_sample: IntProperty(name="Sample", description="The sample whose units are shown", default=0, min=0)
+    slice_layer: EnumProperty(
+        name="Field", description="What is drawn on the slice", items=_FIELD_ITEMS, update=notify("slice_layer")
+    )
+    slice_resolution: EnumProperty(
+        name="Resolution",
+        description="Pixels along each side of the slice",
+        items=[
+            ("128", "128", "Quick"),
+            ("192", "192", "Between the two"),
+            ("256", "256", "Fine"),
+            ("512", "512", "Very fine; slow to move"),
+        ],
+        default="128",
+        update=notify("slice_resolution"),
+    )
+
+
+CLASSES = (FMQMWorstPatch, FMQMLook)

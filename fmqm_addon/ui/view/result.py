@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The chosen row's result, and where it stands in the world."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ...blender.display import scene_objects, viewport
+from ...metric.errors import FMQMError
+from ...metric.spatial import Floats
+from .. import session
+from ..properties.rows import active_row
+from ..properties.view import FMQMLook
+
+POINT = 1.1  # usual radius of a point, in mean distances between neighbors
+AGAIN = "the samples are not in memory any longer; press Measure Quality again"
+UID = "fmqm_uid"  # custom property of our objects: the row that they show
+
+
+def look_of(scene: bpy.types.Scene) -> FMQMLook:
+    look: FMQMLook = scene.fmqm.look
+    return look
+
+
+def measured_row(scene: bpy.types.Scene) -> tuple[str, str, session.Measured]:
+    """Identifier and name of the chosen row, and what it was computed from.
+
+    Raises:
+        FMQMError: no row, or its samples are gone.
+    """
+    row = active_row(scene)
+    if row is None:
+        raise FMQMError("there is no result yet; press Measure Quality first")
+    measured = session.get(row.uid)
+    if measured is None:
+        raise FMQMError(f"{row.name}: {'it could not be measured' if row.error else AGAIN}")
+    return row.uid, row.name, measured
+
+
+def measured_of(shown: bpy.types.Object | None) -> session.Measured | None:
+    """What an object of ours was made from, if that is still in memory."""
+    return None if shown is None else session.get(shown.get(UID, ""))
+
+
+def world_matrix(measured: session.Measured, place: str) -> Floats:
+    """(4, 4) from the metric's frame to where a row's reference, or its compared object, stands."""
+    frame = measured.reference.frame
+    into = np.eye(4)
+    into[:3, :3] *= frame.scale
+    into[:3, 3] = frame.center
+    to_world = measured.reference_to_world if place == "REFERENCE" else measured.distorted_to_world
+    matrix: Floats = np.asarray(to_world, np.float64) @ into
+    return matrix
+
+
+def world_length(measured: session.Measured) -> float:
+    """Scene units of the metric's unit, the reference's diagonal."""
+    matrix = world_matrix(measured, "REFERENCE")
+    return float(np.cbrt(abs(np.linalg.det(matrix[:3, :3]))))
+
+
+def appear(object_: bpy.types.Object) -> None:
+    bpy.context.view_layer.update()
+    scene_objects.reveal(object_, bpy.context.view_layer)
+    viewport.show_in_local_views(object_)
