@@ -342,7 +342,7 @@ def test_the_place_of_the_compared(fmqm: FMQMScene, lods: list[bpy.types.Object]
     ],
 )
 def test_rows_that_are_out_of_date(
-    fmqm: FMQMScene, lods: list[bpy.types.Object], change: object, stale: set[str]
+    fmqm: FMQMScene, lods: list[bpy.types.Object], change: object, names: set[str]
 ) -> None:
     compare(lods[0], *lods[1:])
     bpy.ops.fmqm.measure()
