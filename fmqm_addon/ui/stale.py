@@ -13,7 +13,7 @@ from collections.abc import Callable
 import bpy
 from bpy.app.handlers import persistent
 
-from ..blender.scene.target import fingerprint, in_edit_mode
+from ..blender.scene.fingerprint import fingerprint, in_edit_mode
 from ..comparison.alignment import place_counts
 from . import session
 from .properties.items import item_target, kept

@@ -16,7 +16,7 @@ import pytest
 
 import fmqm_addon
 from fmqm_addon import api
-from fmqm_addon.blender.scene import measure, target
+from fmqm_addon.blender.scene import fingerprint, measure
 from fmqm_addon.blender.scene.target import target_of
 from fmqm_addon.metric.errors import SettingsError
 from fmqm_addon.metric.evaluation import COLUMNS
@@ -387,7 +387,7 @@ def test_painting_of_large_images_marks(
     fmqm: FMQMScene, lods: list[bpy.types.Object], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Without a look at all their pixels."""
-    monkeypatch.setattr(target, "_MOST_PAINTED", 32 * 32 * 4 - 1)
+    monkeypatch.setattr(fingerprint, "_MOST_PAINTED", 32 * 32 * 4 - 1)
     lods[1].data.materials[0] = scenes.textured(scenes.write_png(tmp_path / "own.png", scenes.noise(32)))
     image = bpy.data.images["own.png"]
     compare(lods[0], lods[1])

@@ -20,10 +20,11 @@ from fmqm_addon.blender.files.load import load_mesh, load_placed
 from fmqm_addon.blender.materials.types import Reading
 from fmqm_addon.blender.scene import mesh_arrays as mesh_module
 from fmqm_addon.blender.scene.evaluated import evaluated
+from fmqm_addon.blender.scene.fingerprint import fingerprint
 from fmqm_addon.blender.scene.measure import measuring
 from fmqm_addon.blender.scene.members import check_object, metaball_mother, scene_members
 from fmqm_addon.blender.scene.mesh_arrays import mesh_arrays
-from fmqm_addon.blender.scene.target import fingerprint, take, target_of
+from fmqm_addon.blender.scene.target import take, target_of
 from fmqm_addon.comparison.alignment import place
 from fmqm_addon.comparison.measurement import Measurement
 from fmqm_addon.comparison.pair import Question

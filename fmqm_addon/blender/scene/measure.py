@@ -17,7 +17,8 @@ from ...metric.evaluation import Scores
 from ...metric.stepper import Progress, Stepper, Work, as_part
 from ..materials.images import TextureCache
 from ..materials.types import Reading
-from .target import Target, bakes, fingerprint, take
+from .fingerprint import fingerprint
+from .target import Target, bakes, take
 
 _READING = 0.05  # share of the whole that reading the scene takes, about
 

@@ -17,7 +17,8 @@ from ...blender.scene.decimate import (
     reducing,
     scene_reader,
 )
-from ...blender.scene.target import fingerprint, target_of
+from ...blender.scene.fingerprint import fingerprint
+from ...blender.scene.target import target_of
 from ...metric.errors import FMQMError
 from ...metric.score import Stepper, Work
 from ...metric.settings import Settings
