@@ -98,6 +98,7 @@ def balls() -> bpy.types.Object:
     mother = added(bpy.ops.object.metaball_add, "Ball")
     bpy.ops.object.metaball_add(location=(3, 2, 1))
     bpy.context.object.name = "Ball.001"
+    bpy.context.object.parent = mother  # moved alone, the two would flow together otherwise
     mother.update_tag()  # Blender does not notice that a name makes them flow together
     return mother
 
