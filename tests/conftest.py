@@ -18,22 +18,9 @@ sys.path.insert(0, str(ROOT))
 os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix="fmqm-tests-")
 
 
-_EXIT_STATUS = pytest.StashKey[int]()
-
-
 @pytest.hookimpl(trylast=True)
-def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
-    session.config.stash[_EXIT_STATUS] = int(exitstatus)
-
-
-@pytest.hookimpl(trylast=True)
-def pytest_unconfigure(config: pytest.Config) -> None:
-    """Ends the process here where bpy was loaded: after some hundred tests bpy 4.5 can hang while it is torn down."""
+def pytest_unconfigure() -> None:
     shutil.rmtree(os.environ["BLENDER_USER_RESOURCES"], ignore_errors=True)
-    if "bpy" in sys.modules and _EXIT_STATUS in config.stash:
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(config.stash[_EXIT_STATUS])
 
 
 @pytest.fixture(scope="session")

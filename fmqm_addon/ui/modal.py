@@ -20,7 +20,9 @@ TICK = 0.005  # seconds between ticks, for Blender to draw and listen
 class SteppedOperator:
     """A part of operators that run a stepper; called from Python they run it at once.
 
-    An operator's own begin makes the stepper, or reports why not and returns False; finish uses its result.
+    An operator's own begin makes the stepper, or reports why not and returns False; finish uses its result. Operators
+    annotate nothing but properties: Blender evaluates the annotations of what it registers, typing remembers what
+    `Stepper[list[Outcome]]` came to, and what is remembered longer than bpy keeps Blender 4.5 from ending.
 
     Attributes:
         noun: what is cancelled, for its message.

@@ -6,6 +6,8 @@ from __future__ import annotations
 import inspect
 import json
 import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -33,6 +35,7 @@ from fmqm_addon.ui.properties.settings import metric_settings
 from . import scenes
 from .script import read_json, score
 
+ROOT = Path(fmqm_addon.__file__).parents[1]
 QUICK = Settings(samples=8_000, patches=40)
 
 
@@ -700,3 +703,15 @@ def test_register_leaves_nothing_when_undone() -> None:
                 assert not any("fmqm" in getattr(handler, "__module__", "") for handler in handlers)
     finally:
         fmqm_addon.register()
+
+
+@pytest.mark.parametrize("handlers", [False, True], ids=["plain", "handlers"])
+def test_python_ends_after_the_add_on(handlers: bool) -> None:
+    """bpy 4.5 hangs at the end of Python as long as anything refers to what it has registered."""
+    lines = ["import bpy, fmqm_addon", "fmqm_addon.register()"]
+    if handlers:  # which only the window has
+        lines.append("from fmqm_addon.ui.stale import _HANDLERS")
+        lines.append("for name, handler in _HANDLERS: getattr(bpy.app.handlers, name).append(handler)")
+    lines.append("fmqm_addon.unregister()")
+    done = subprocess.run([sys.executable, "-c", "\n".join(lines)], cwd=ROOT, timeout=60, check=False)
+    assert done.returncode == 0

@@ -38,10 +38,6 @@ class FMQM_OT_decimate(SteppedOperator, bpy.types.Operator):  # noqa: N801
     bl_options: ClassVar = {"UNDO"}  # no REGISTER: adjusting the last operation would search all over again
 
     noun = "Decimation"
-    stepper: Stepper[Reduced | FMQMError]
-    _name: str
-    _scene: str
-    _mark: str
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

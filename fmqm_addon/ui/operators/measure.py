@@ -14,7 +14,6 @@ from ...blender.scene.measure import Outcome, measuring
 from ...blender.scene.target import target_of
 from ...comparison.pair import Question
 from ...metric.errors import FMQMError
-from ...metric.score import Stepper
 from ...report.trust_table import trust_dict
 from .. import session, stale
 from ..modal import SteppedOperator
@@ -48,9 +47,6 @@ class FMQM_OT_measure(SteppedOperator, bpy.types.Operator):  # noqa: N801
     bl_label = "Measure Quality"
     bl_description = "Score the listed objects against the reference. Esc cancels"
     bl_options: ClassVar = {"UNDO"}  # no REGISTER: adjusting the last operation would measure all over again
-
-    stepper: Stepper[list[Outcome]]
-    _scene: str
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
