@@ -29,9 +29,10 @@ def save_fields(path: str, result: Result) -> None:
         FileError: the file cannot be written.
     """
     frame = result.frame
-    with replaced(path) as temporary:
+    # An open file: to a path that ends in .NPZ, or in nothing, numpy appends .npz.
+    with replaced(path) as temporary, open(temporary, "wb") as file:
         np.savez(
-            temporary,
+            file,
             position=frame.leave(result.samples.positions),
             patch=result.samples.patch,
             unit=result.samples.unit,

@@ -44,7 +44,7 @@ class SteppedOperator:
         if not self.begin(context):
             return {"CANCELLED"}
         self.stepper.run()
-        return self.finish(context)
+        return self._finish(context)
 
     def invoke(self, context: bpy.types.Context, _: bpy.types.Event) -> set[str]:
         if bpy.app.background or context.window is None:
@@ -73,9 +73,11 @@ class SteppedOperator:
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         job = self._job
         if session.job is not job:  # another file, or the add-on was disabled
+            self._let_go()
             return {"CANCELLED"}
         if job.cancelled or (event.type == "ESC" and event.value == "PRESS"):
             job.stop()
+            self._let_go()
             self.report({"INFO"}, f"{self.noun} cancelled")
             return {"CANCELLED"}
         if event.type != "TIMER":
@@ -89,11 +91,23 @@ class SteppedOperator:
             self._show(context, job)
             return {"PASS_THROUGH"}
         job.stop()
-        return self.finish(context)
+        return self._finish(context)
 
     def cancel(self, _: bpy.types.Context) -> None:
         """Blender ends the operator: a window was closed, another file was opened."""
         self._job.stop()
+        self._let_go()
+
+    def _finish(self, context: bpy.types.Context) -> set[str]:
+        try:
+            return self.finish(context)
+        finally:
+            self._let_go()
+
+    def _let_go(self) -> None:
+        """Of the arrays: Blender keeps the last operators, for its history."""
+        for name in self.__dict__.keys() & {"stepper", "_job"}:
+            delattr(self, name)
 
     def _slice(self) -> bool:
         """Some milliseconds of work; whether there is more. Ends where something else begins: it may be one long step,

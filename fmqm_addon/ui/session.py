@@ -55,13 +55,15 @@ def put(uid: str, measured: Measured) -> None:
 
 
 def get(uid: str) -> Measured | None:
-    """None: measured in another session, or dropped; the row has to be measured again."""
+    """None: measured in another session, or the row was removed since; it has to be measured again."""
     return _measured.get(uid)
 
 
-def drop(uid: str) -> None:
-    _measured.pop(uid, None)
-    stale.pop(uid, None)
+def keep(uids: set[str]) -> None:
+    """Lets go of all that belongs to other rows."""
+    for remembered in (_measured, stale):
+        for uid in remembered.keys() - uids:
+            del remembered[uid]
 
 
 def clear() -> None:

@@ -18,9 +18,15 @@ from ..comparison.alignment import place_counts
 from . import session
 from .properties.items import item_target, kept
 from .properties.rows import row_targets
-from .view.shown import settle_colors
+from .view.shown import forget_removed, settle_colors
 
-_WATCHED = (bpy.types.Object, bpy.types.Mesh, bpy.types.Material, bpy.types.NodeTree, bpy.types.Image)
+_WATCHED = tuple(
+    getattr(bpy.types, name)
+    for name in (
+        *("Object", "Collection", "Mesh", "Key", "Curve", "MetaBall", "Armature", "Lattice"),
+        *("Material", "NodeTree", "Texture", "Image"),
+    )
+)
 _DELAY = 0.7  # seconds without a change before the rows are looked at
 
 
@@ -89,6 +95,7 @@ def _kept(handler: Callable[..., None]) -> Callable[..., None]:
 
 @_kept
 def _on_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    forget_removed()
     if not scene.fmqm.rows:
         return
     for update in depsgraph.updates:
@@ -99,6 +106,7 @@ def _on_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 
 @_kept
 def _on_undo(*_: object) -> None:
+    forget_removed()
     soon()
     bpy.app.timers.register(settle_colors, first_interval=0)
 

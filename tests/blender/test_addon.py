@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+import gc
 import inspect
 import json
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
+import weakref
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -557,6 +559,12 @@ def test_saving(fmqm: FMQMScene, lods: list[bpy.types.Object], tmp_path: Path) -
     assert (tmp_path / "out.csv").read_text().count("\n") == 3
     with np.load(tmp_path / "out.npz") as fields:
         assert fields["patch_scores"].mean(axis=0).tolist() == pytest.approx(numbers(fmqm.rows[0]))
+    (tmp_path / "loud").mkdir()
+    for kind in ("JSON", "CSV", "NPZ"):
+        path = tmp_path / "loud" / f"out.{kind}"
+        assert bpy.ops.fmqm.save_results(filepath=str(path), file_format=kind.lower()) == {"FINISHED"}
+        assert path.stat().st_size > 100
+    assert len(list((tmp_path / "loud").iterdir())) == 3
     with pytest.raises(RuntimeError, match="No file is named"):
         bpy.ops.fmqm.save_results()
     with pytest.raises(RuntimeError, match="does not exist"):
@@ -569,6 +577,72 @@ def test_saving(fmqm: FMQMScene, lods: list[bpy.types.Object], tmp_path: Path) -
     session.clear()
     with pytest.raises(RuntimeError, match="measure again"):
         bpy.ops.fmqm.save_results(filepath=str(tmp_path / "out.npz"), file_format="npz")
+
+
+def remembered(fmqm: FMQMScene) -> dict[str, list[weakref.ref[object]]]:
+    """What each row has of its own: samples and the reference are the same for all."""
+    found = {}
+    for row in fmqm.rows:
+        measured = session.get(row.uid)
+        held = (measured.comparison, measured.comparison.distorted, measured.comparison.result.dist.sdf)
+        found[row.name] = [weakref.ref(each) for each in held]
+    return found
+
+
+def alive(references: list[weakref.ref[object]]) -> bool:
+    gc.collect()
+    return any(each() is not None for each in references)
+
+
+def remove_chosen(_: FMQMScene) -> None:
+    bpy.ops.fmqm.remove_row()
+
+
+def by_script_or_undo(fmqm: FMQMScene) -> None:
+    fmqm.rows.remove(0)
+    stale._on_undo()  # as in the window
+
+
+def by_hand_in_the_window(fmqm: FMQMScene) -> None:
+    fmqm.rows.remove(0)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    stale._on_change(bpy.context.scene, depsgraph)
+
+
+@pytest.mark.parametrize("remove", [remove_chosen, by_script_or_undo, by_hand_in_the_window])
+def test_arrays_go_with_their_row(fmqm: FMQMScene, lods: list[bpy.types.Object], remove: Callable[..., None]) -> None:
+    compare(lods[0], *lods[1:])
+    bpy.ops.fmqm.measure()
+    fmqm.row_index = 0
+    for act in (bpy.ops.fmqm.look, bpy.ops.fmqm.paint_surface, bpy.ops.fmqm.unit_step):
+        act()
+    held = remembered(fmqm)
+    remove(fmqm)
+    assert not alive(held["Rock_LOD1"]) and alive(held["Rock_LOD2"])
+    bpy.ops.fmqm.clear_results()
+    assert not alive(held["Rock_LOD2"])
+
+
+def test_arrays_go_when_measured_again(fmqm: FMQMScene, lods: list[bpy.types.Object]) -> None:
+    compare(lods[0], lods[1])
+    bpy.ops.fmqm.measure()
+    held = remembered(fmqm)
+    bpy.ops.fmqm.measure()
+    assert not alive(held["Rock_LOD1"]) and alive(remembered(fmqm)["Rock_LOD1"])
+
+
+def test_arrays_go_with_their_scene_but_not_those_of_a_copy(fmqm: FMQMScene, lods: list[bpy.types.Object]) -> None:
+    compare(lods[0], lods[1])
+    bpy.ops.fmqm.measure()
+    held = remembered(fmqm)["Rock_LOD1"]
+    first, other = bpy.context.scene, bpy.data.scenes.new("Other")
+    copy = first.copy()
+    bpy.context.window.scene = other
+    for scene in (first, copy):
+        assert alive(held)
+        bpy.data.scenes.remove(scene)
+        stale._on_change(other, other.view_layers[0].depsgraph or bpy.context.evaluated_depsgraph_get())
+    assert not alive(held)
 
 
 def test_rows_at_other_settings_are_told_apart(fmqm: FMQMScene, lods: list[bpy.types.Object]) -> None:

@@ -527,7 +527,7 @@ def test_switched_off_it_leaves_nothing(scene: bpy.types.Scene) -> None:
 def test_without_samples_it_says_measure_again(scene: bpy.types.Scene) -> None:
     bpy.ops.fmqm.look()
     before = point_colors()
-    session.drop("row")
+    session.clear()
     scene.fmqm.look.layer = "PATCH"  # no error: there is nobody to tell
     assert (point_colors() == before).all()
     assert not bpy.ops.fmqm.look.poll() and not bpy.ops.fmqm.slice.poll()

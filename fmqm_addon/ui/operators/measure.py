@@ -21,6 +21,7 @@ from ..properties.items import item_target
 from ..properties.rows import numbers_text, row_targets
 from ..properties.scene import FMQMScene
 from ..properties.settings import metric_settings
+from ..view.shown import forget_removed
 from .inputs import reference_of
 
 
@@ -87,6 +88,7 @@ class FMQM_OT_measure(SteppedOperator, bpy.types.Operator):  # noqa: N801
         for outcome in outcomes:
             _write_row(scene.fmqm, outcome, self._settings_text)
         _choose_row(scene.fmqm, outcomes[0])
+        forget_removed()  # of rows that these replace
         failed = [outcome for outcome in outcomes if outcome.error]
         total = sum(outcome.seconds.get("total", 0.0) for outcome in outcomes)
         if failed:
@@ -121,7 +123,6 @@ def _write_row(fmqm: FMQMScene, outcome: Outcome, settings_text: str) -> None:
     if row is not None and row.scores and outcome.error and any(target.is_gone() for target in key):
         return
     row = row or fmqm.rows.add()
-    session.drop(row.uid)
     row.uid = uuid.uuid4().hex
     row.name, row.kind = outcome.target.name, outcome.target.kind
     row.reference_name, row.reference_kind = outcome.reference_target.name, outcome.reference_target.kind

@@ -10,6 +10,7 @@ from bpy.props import EnumProperty
 
 from ...report.records import table_text
 from ..properties.rows import EXPLAINED, active_row, pair_of, row_scores
+from ..view.shown import forget_removed
 
 
 def has_rows(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
@@ -68,6 +69,7 @@ class FMQM_OT_remove_row(bpy.types.Operator):  # noqa: N801
         fmqm = context.scene.fmqm
         fmqm.rows.remove(fmqm.row_index)
         fmqm.row_index = max(0, min(fmqm.row_index, len(fmqm.rows) - 1))
+        forget_removed()
         return {"FINISHED"}
 
 
@@ -82,9 +84,9 @@ class FMQM_OT_clear_results(bpy.types.Operator):  # noqa: N801
         return has_rows(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        # The fields stay in the session's memory: undo brings the rows back.
         context.scene.fmqm.rows.clear()
         context.scene.fmqm.row_index = 0
+        forget_removed()
         return {"FINISHED"}
 
 

@@ -74,9 +74,10 @@ def _fields_of_vertices(uid: str, measured: session.Measured) -> tuple[Fields, F
     return _painted_fields[uid]
 
 
-def forget_fields() -> None:
-    """Lets go of the fields that are kept for recoloring."""
-    _painted_fields.clear()
+def keep_fields(uids: set[str]) -> None:
+    """Lets go of the fields that were kept for recoloring other rows than these."""
+    for uid in _painted_fields.keys() - uids:
+        del _painted_fields[uid]
 
 
 def _vertex_normals(vertices: Floats, triangles: Ints) -> Floats:

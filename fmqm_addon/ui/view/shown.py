@@ -7,10 +7,11 @@ import bpy
 from mathutils import Matrix
 
 from ...blender.display import scene_objects, viewport
+from .. import session
 from ..properties.rows import active_row
 from . import overlay, worst
 from .cloud import build_cloud
-from .painted import build_painted, forget_fields
+from .painted import build_painted, keep_fields
 from .result import UID, look_of, measured_of, measured_row, world_matrix
 from .shells import build_shells
 from .slice_plane import draw_slice
@@ -55,13 +56,22 @@ def move_shown(scene: bpy.types.Scene) -> None:
 def clear() -> int:
     """Removes all of it from the file and gives the views their settings back; how many data-blocks there were."""
     overlay.figure = None
-    forget_fields()
+    keep_fields(set())
     for scene in bpy.data.scenes:
         look_of(scene).focused = False
     count = scene_objects.clear()
     viewport.restore_colors()
     viewport.redraw()
     return count
+
+
+def forget_removed() -> None:
+    """Lets go of the arrays of rows that no scene has any more; undo brings such a row back without them. Cheap."""
+    uids = {row.uid for scene in bpy.data.scenes for row in scene.fmqm.rows}
+    session.keep(uids)
+    keep_fields(uids)
+    if overlay.figure is not None and overlay.figure.uid not in uids:
+        overlay.figure = None
 
 
 def settle_colors() -> None:
