@@ -12,10 +12,14 @@ RUN = $(VENV)/bin/python
 # Blender's own tool for extensions, which needs no Blender.
 EXTENSION_TOOL = $(RUN) $(VENV)/lib/python*/site-packages/bpy/*/scripts/addons_core/bl_pkg/cli/blender_ext.py
 
-.PHONY: demo extension test test-all stress bench lint clean
+.PHONY: demo pictures extension test test-all stress bench lint clean
 
 demo: $(VENV)/runs
 	$(RUN) scripts/demo.py --out out/demo
+
+# Every picture of README and docs; those of Blender's window by the command that FMQM_SCREENSHOT names.
+pictures: $(VENV)/runs
+	$(RUN) scripts/pictures.py
 
 # dist/fmqm-<version>.zip, to drop into Blender's window.
 extension: $(VENV)/runs

@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Makes every picture of README and docs anew, so that they show the same numbers: make pictures.
+
+    python scripts/pictures.py [--out out/pictures] [--docs docs]
+
+demo.png is the demo's own. report.png needs Chromium. look.png, units.png and slice.png are taken from Blender's
+window by the command that the variable FMQM_SCREENSHOT names: `... SCRIPT OUT_PREFIX` opens the window, runs the
+script with shot(name) and done() in builtins, and saves OUT_PREFIX-name.png. What is missing is said, and skipped.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import demo  # beside this file
+from PIL import Image
+
+LEVELS = ((0.4, 1024), (0.15, 512), (0.06, 256))  # of the report: triangles that are kept, side of the texture
+REPORT_SIZE = (880, 1306)
+WINDOW_PICTURES = ("look", "units", "slice")
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+
+
+def run(*command: object) -> None:
+    subprocess.run([str(part) for part in command], check=True)
+
+
+def script(name: str, *arguments: object) -> None:
+    run(sys.executable, demo.ROOT / "scripts" / name, *arguments)
+
+
+def build_levels(folder: Path) -> list[Path]:
+    """The urn's levels of detail, each with fewer triangles and a smaller texture."""
+    demo.bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    line = demo.outline()
+    pixels = demo.paint_texture(line)
+    urn = demo.build_object(line)
+    decimate = urn.modifiers.new("LOD", "DECIMATE")
+    paths = []
+    for number, (ratio, side) in enumerate(LEVELS, 1):
+        step = len(pixels) // side
+        smaller = pixels.reshape(side, step, side, step, -1).mean(axis=(1, 3))
+        decimate.ratio = ratio
+        demo.set_texture(urn, demo.save_picture(smaller, folder / f"urn_lod{number}.jpg", "JPEG", 90))
+        paths.append(folder / f"urn_lod{number}.glb")
+        demo.export(paths[-1])
+    return paths
+
+
+def picture_of_report(out: Path, reference: Path) -> Path | None:
+    browser = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if browser is None:
+        print(f"pictures.py: report.png is left as it is: none of {', '.join(BROWSERS)} is installed")
+        return None
+    levels = build_levels(out)
+    script("score.py", reference, *levels, "--report", out / "report", "--attribution", "--explain")
+    picture = out / "report.png"
+    size = "{},{}".format(*REPORT_SIZE)
+    page = (out / "report" / "index.html").as_uri()
+    run(
+        *(
+            browser,
+            "--headless=new",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--hide-scrollbars",
+            "--blink-settings=imagesEnabled=true",
+        ),
+        *(f"--window-size={size}", "--virtual-time-budget=5000", f"--screenshot={picture}", page),
+    )
+    return picture
+
+
+def pictures_of_window(out: Path, *urns: Path) -> list[Path]:
+    command = os.environ.get("FMQM_SCREENSHOT")
+    if not command:
+        names = ", ".join(f"{name}.png" for name in WINDOW_PICTURES)
+        print(f"pictures.py: {names} are left as they are: FMQM_SCREENSHOT names no command that takes pictures")
+        return []
+    rectangle = out / "rectangle.json"
+    rectangle.unlink(missing_ok=True)
+    subprocess.run(
+        [*shlex.split(command), str(Path(__file__).with_name("pictures_window.py")), str(out / "window")],
+        env={**os.environ, "FMQM_ROOT": str(demo.ROOT), "FMQM_URNS": json.dumps([str(urn) for urn in urns]),
+             "FMQM_RECTANGLE": str(rectangle)},
+        check=False,
+    )  # fmt: skip
+    if not rectangle.is_file():
+        sys.exit("pictures.py: Blender's window could not be opened")
+    x, y, width, height = json.loads(rectangle.read_text())
+    found = []
+    for name in WINDOW_PICTURES:
+        whole = Image.open(out / f"window-{name}.png").convert("RGB")
+        found.append(out / f"{name}.png")
+        whole.crop((x, whole.height - y - height, x + width, whole.height - y)).save(found[-1])
+    return found
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Make every picture of README and docs anew.")
+    parser.add_argument("--out", type=Path, default=Path("out/pictures"), help="folder for the files")
+    parser.add_argument("--docs", type=Path, default=demo.ROOT / "docs", help="folder for the pictures")
+    args = parser.parse_args()
+    out = args.out.resolve()
+    script("demo.py", "--out", out)
+    urns = out / "urn.glb", out / "urn_lod.glb"
+    shutil.copy(out / "demo.png", args.docs / "demo.png")
+    report = picture_of_report(out, urns[0])
+    for picture in (*([report] if report else []), *pictures_of_window(out, *urns)):
+        small = Image.open(picture).convert("RGB").quantize(256, dither=Image.Dither.NONE)
+        small.save(args.docs / picture.name, optimize=True)
+    print(f"the pictures are in {args.docs}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Runs inside Blender's window, started by pictures.py: measures the demo's urns and takes pictures of the add-on."""
+
+from __future__ import annotations
+
+import builtins
+import json
+import math
+import os
+import sys
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+
+import bpy
+from mathutils import Euler
+
+sys.path.insert(0, os.environ["FMQM_ROOT"])
+DRAWN = 6  # seconds until a change is on the screen, drawn by software
+DISTANCE = 1.5  # between the two urns
+
+
+def view() -> tuple[bpy.types.Window, bpy.types.Area]:
+    window = bpy.context.window_manager.windows[0]
+    return window, next(area for area in window.screen.areas if area.type == "VIEW_3D")
+
+
+def look_from(turn: float, center: tuple[float, float, float], distance: float) -> None:
+    region = view()[1].spaces.active.region_3d
+    region.view_rotation = Euler((math.radians(80), 0, math.radians(turn))).to_quaternion()
+    region.view_location, region.view_distance = center, distance
+
+
+def start() -> None:
+    import fmqm_addon
+
+    fmqm_addon.register()
+    for object_ in list(bpy.data.objects):
+        bpy.data.objects.remove(object_)
+    for level, path in enumerate(json.loads(os.environ["FMQM_URNS"])):
+        bpy.ops.import_scene.gltf(filepath=path)
+        urn = next(o for o in bpy.context.selected_objects if o.type == "MESH")
+        urn.name = f"Urn_LOD{level}"
+        urn.location.x += level * DISTANCE
+    view()[1].spaces.active.show_region_ui = True
+    look_from(0, (0.9, 0, 0.8), 4.2)
+
+
+def measure() -> None:
+    _, area = view()
+    next(region for region in area.regions if region.type == "UI").active_panel_category = "FMQM"
+    Path(os.environ["FMQM_RECTANGLE"]).write_text(json.dumps([area.x, area.y, area.width, area.height]))
+    bpy.ops.fmqm.find_lods()
+    bpy.context.scene.fmqm.settings.attribution = True
+    bpy.ops.object.select_all(action="DESELECT")
+    bpy.ops.fmqm.measure("INVOKE_DEFAULT")
+
+
+def look() -> None:
+    shown = bpy.context.scene.fmqm.look
+    shown.range, shown.point_size = "FITTED", 1.6
+    bpy.ops.fmqm.look()
+
+
+def units() -> None:
+    shown = bpy.context.scene.fmqm.look
+    shown.range, shown.point_size = "FIXED", 1.0
+    look_from(25, (0.6, 0, 0.7), 4.0)
+    for _ in range(40):
+        bpy.ops.fmqm.unit_step(step=1)
+
+
+def slice_() -> None:
+    bpy.ops.fmqm.clear()
+    bpy.context.scene.fmqm.look.slice_layer = "NCF_REFERENCE"
+    bpy.context.scene.fmqm.look.slice_resolution = "256"
+    look_from(25, (0.6, 0, 0.7), 4.0)
+    bpy.ops.fmqm.slice()
+
+
+STEPS: list[tuple[Callable[[], object], str]] = [
+    (start, ""), (measure, ""), (look, "look"), (units, "units"), (slice_, "slice"),
+]  # fmt: skip
+
+
+def step() -> float | None:
+    session = sys.modules.get("fmqm_addon.ui.session")
+    if session is not None and session.job is not None:
+        return 0.5  # the modal operator is still measuring; its own timer drives it
+    if not STEPS:
+        builtins.done()
+        return None
+    act, name = STEPS.pop(0)
+    window, area = view()
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    try:
+        with bpy.context.temp_override(window=window, area=area, region=region):
+            act()
+    except Exception:
+        traceback.print_exc()
+        builtins.done()
+        return None
+    bpy.app.timers.register(lambda: picture(name), first_interval=DRAWN)
+    return None
+
+
+def picture(name: str) -> None:
+    if name:
+        builtins.shot(name)
+    bpy.app.timers.register(step, first_interval=0.1)
+
+
+bpy.app.timers.register(step, first_interval=3)
