@@ -25,6 +25,7 @@ from fmqm_addon.blender.scene.target import target_of
 from fmqm_addon.metric.errors import SettingsError
 from fmqm_addon.metric.evaluation import COLUMNS
 from fmqm_addon.metric.settings import Settings
+from fmqm_addon.metric.stepper import Progress, Stepper, Work
 from fmqm_addon.ui import operators, panels, properties, session, stale
 from fmqm_addon.ui.modal import SteppedOperator
 from fmqm_addon.ui.operators import inputs
@@ -707,9 +708,8 @@ def test_texts() -> None:
             assert not prop.description.endswith("."), prop.description
             assert all(word in small or word[0].isupper() or word[0] in "(" for word in prop.name.split()), prop.name
     for cls in (*operators.CLASSES, *panels.CLASSES):
-        label = (
-            "" if cls is panels.settings.FMQM_PT_presets else getattr(cls, "bl_label", "")
-        )  # Blender writes into that one
+        # Blender writes into that of the presets.
+        label = "" if cls is panels.settings.FMQM_PT_presets else getattr(cls, "bl_label", "")
         assert all(word in small or not word[0].islower() for word in label.split()), label
         if issubclass(cls, bpy.types.Operator):
             description = getattr(cls, "bl_description", "")

@@ -22,6 +22,7 @@ from fmqm_addon.comparison.measurement import Measurement
 from fmqm_addon.comparison.pair import Question
 from fmqm_addon.metric.settings import PRESETS, Settings
 from fmqm_addon.metric.surface import MeshArrays
+from fmqm_addon.metric.texture import Material, PlainColor
 from fmqm_addon.ui.operators import inputs
 from fmqm_addon.ui.panels import results as panels
 from fmqm_addon.ui.properties.rows import row_attribution

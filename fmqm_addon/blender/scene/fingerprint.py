@@ -19,7 +19,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...metric.spatial import Floats
+from ...metric.geometry import Floats
 from ..materials.images import image_paths
 from .members import collection_members, instanced, metaball_family
 from .target import Target

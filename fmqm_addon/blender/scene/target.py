@@ -11,7 +11,7 @@ import numpy as np
 
 from ...comparison.alignment import Placed
 from ...metric.errors import MeshError
-from ...metric.spatial import Floats
+from ...metric.geometry import Floats
 from ..materials.images import TextureCache
 from ..materials.types import Reading
 from .evaluated import evaluated

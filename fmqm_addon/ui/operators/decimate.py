@@ -20,8 +20,8 @@ from ...blender.scene.decimate import (
 from ...blender.scene.fingerprint import fingerprint
 from ...blender.scene.target import target_of
 from ...metric.errors import FMQMError
-from ...metric.score import Stepper, Work
 from ...metric.settings import Settings
+from ...metric.stepper import Stepper, Work
 from .. import session
 from ..modal import SteppedOperator
 from ..properties.decimate import FMQMDecimate

@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 
 from ...comparison.alignment import PLACE_LABELS
-from ...metric.score import COLUMNS
+from ...metric.evaluation import COLUMNS
 from ...report.records import SHOWN
 from .. import session
 from ..properties.rows import (

@@ -16,9 +16,8 @@ from bpy.props import (
 )
 
 from ...blender.scene.target import Target
-from ...metric.score import COLUMNS
+from ...metric.evaluation import COLUMNS, Scores
 from ...metric.settings import PRESETS, SETTING_NAMES, Settings
-from ...metric.spatial import Floats
 from ...report.records import SHOWN, PairScore
 from ...report.trust_table import Report
 
@@ -89,7 +88,7 @@ def row_targets(row: FMQMRow) -> tuple[Target, Target]:
 
 
 def row_scores(row: FMQMRow) -> dict[str, float] | None:
-    """The five scores by the names of metric.score.COLUMNS, in double precision; None for a row with an error."""
+    """The five scores by the names of metric.evaluation.COLUMNS, in double precision; None for a row with an error."""
     return _columns(row.scores)
 
 
@@ -151,22 +150,22 @@ def pair_of(row: FMQMRow) -> PairScore:
     return PairScore(
         reference=reference.label,
         distorted=target.label,
-        scores=_array(row_scores(row)),
-        stderr=_array(row_stderr(row)),
+        scores=_scores(row_scores(row)),
+        stderr=_scores(row_stderr(row)),
         patches=row.patches or None,
         samples=row.samples or None,
         seconds=json.loads(row.stages or "{}"),
         warnings=tuple(row.warnings.splitlines()),
         error=row.error or None,
         space=row.space or None,
-        reverse=_array(row_reverse(row)),
+        reverse=_scores(row_reverse(row)),
         trust=row_trust(row),
         findings={} if attribution is None else {"attribution": attribution},
     )
 
 
-def _array(columns: dict[str, float] | None) -> Floats | None:
-    return None if columns is None else np.array([columns[name] for name in COLUMNS])
+def _scores(columns: dict[str, float] | None) -> Scores | None:
+    return None if columns is None else Scores(**columns)
 
 
 CLASSES = (FMQMRow,)

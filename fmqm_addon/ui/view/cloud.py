@@ -8,8 +8,8 @@ import numpy as np
 
 from ...blender.display import scene_objects, viewport
 from ...metric.errors import FMQMError
-from ...metric.score import Result
-from ...metric.spatial import Floats
+from ...metric.evaluation import Result
+from ...metric.geometry import Floats
 from ...report.visual import layers, probe
 from . import worst
 from .legends import explain

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import bpy
 
-from ...metric.score import Result
+from ...metric.evaluation import Result
 from ...report.visual import layers
 from . import overlay
 

@@ -19,7 +19,7 @@ from gpu_extras.batch import batch_for_shader
 from numpy.typing import NDArray
 
 from ...blender.display import scene_objects
-from ...metric.spatial import Floats
+from ...metric.geometry import Floats
 from .. import session
 from ..properties.rows import active_row
 

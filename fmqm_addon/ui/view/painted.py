@@ -8,7 +8,7 @@ import numpy as np
 
 from ...blender.display import scene_objects, viewport
 from ...metric.fields import Fields
-from ...metric.spatial import Floats, Ints, cross
+from ...metric.geometry import Floats, Ints, cross
 from ...report.visual import layers, probe
 from .. import session
 from .legends import explain

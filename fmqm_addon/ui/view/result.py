@@ -8,7 +8,7 @@ import numpy as np
 
 from ...blender.display import scene_objects, viewport
 from ...metric.errors import FMQMError
-from ...metric.spatial import Floats
+from ...metric.geometry import Floats
 from .. import session
 from ..properties.rows import active_row
 from ..properties.view import FMQMLook

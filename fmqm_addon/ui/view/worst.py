@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from ...metric.score import Result
+from ...metric.evaluation import Result
 from ...report.visual import layers, probe
 from ..properties.view import FMQMLook
 
