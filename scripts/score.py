@@ -280,7 +280,7 @@ def _check_arguments(args: argparse.Namespace) -> None:
         raise SettingsError(f"fail-under is {args.fail_under}; it must be between 0 and 1")
     for flag, ending in (("save_fields", ".npz"), ("picture", ".png")):
         path = getattr(args, flag)
-        if path and not path.endswith(ending):
+        if path and not path.lower().endswith(ending):
             raise SettingsError(f"{_flag(flag)} {path}: the file must end in {ending}")
     for flag in ("journal", "report"):
         if getattr(args, flag) == STDOUT:

@@ -87,6 +87,16 @@ def said(stderr: str) -> list[str]:
 # What it prints and writes
 
 
+def test_endings_in_capitals(assets: Path, tmp_path: Path) -> None:
+    """numpy would add an ending of its own to .NPZ."""
+    outputs = {"--json": "a.JSON", "--csv": "a.Csv", "--save-fields": "a.NPZ", "--picture": "a.Png", "--junit": "a.XML"}
+    flags = [part for flag, name in outputs.items() for part in (flag, tmp_path / name)]
+    done = score("ref.obj", "shaken.obj", *SMALL, *flags, cwd=assets)
+    assert done.returncode == 0, done.stderr
+    written = {path.name: path.stat().st_size for path in tmp_path.iterdir()}
+    assert sorted(written) == sorted(outputs.values()) and min(written.values()) > 100
+
+
 def test_table(whole: Path) -> None:
     header, row = (line.split() for line in (whole / "stdout").read_text(encoding="utf-8").splitlines())
     assert header == ["id", *COLUMNS] and row[0] == "shaken.obj"
