@@ -23,17 +23,18 @@ import demo  # beside this file
 from PIL import Image
 
 LEVELS = ((0.4, 1024), (0.15, 512), (0.06, 256))  # of the report: triangles that are kept, side of the texture
-REPORT_SIZE = (880, 1306)
+REPORT_SIZE = (1040, 1544)  # of the page; the picture is smaller
+WIDTH = 880  # of the picture
 WINDOW_PICTURES = ("look", "units", "slice")
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 
-def run(*command: object) -> None:
-    subprocess.run([str(part) for part in command], check=True)
+def run(*command: object, folder: Path | None = None) -> None:
+    subprocess.run([str(part) for part in command], cwd=folder, check=True)
 
 
-def script(name: str, *arguments: object) -> None:
-    run(sys.executable, demo.ROOT / "scripts" / name, *arguments)
+def script(name: str, *arguments: object, folder: Path | None = None) -> None:
+    run(sys.executable, demo.ROOT / "scripts" / name, *arguments, folder=folder)
 
 
 def build_levels(folder: Path) -> list[Path]:
@@ -60,7 +61,8 @@ def picture_of_report(out: Path, reference: Path) -> Path | None:
         print(f"pictures.py: report.png is left as it is: none of {', '.join(BROWSERS)} is installed")
         return None
     levels = build_levels(out)
-    script("score.py", reference, *levels, "--report", out / "report", "--attribution", "--explain")
+    names = [path.name for path in (reference, *reversed(levels))]  # relative: the page names what it is given
+    script("score.py", *names, "--report", "report", "--attribution", "--explain", folder=out)
     picture = out / "report.png"
     size = "{},{}".format(*REPORT_SIZE)
     page = (out / "report" / "index.html").as_uri()
@@ -75,6 +77,8 @@ def picture_of_report(out: Path, reference: Path) -> Path | None:
         ),
         *(f"--window-size={size}", "--virtual-time-budget=5000", f"--screenshot={picture}", page),
     )
+    whole = Image.open(picture).convert("RGB")
+    whole.resize((WIDTH, round(whole.height * WIDTH / whole.width)), Image.Resampling.LANCZOS).save(picture)
     return picture
 
 

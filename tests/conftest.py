@@ -37,7 +37,13 @@ def pytest_unconfigure(config: pytest.Config) -> None:
         import bpy
         class Act(bpy.types.Operator):
             bl_idname, bl_label = "test.act", "Act"
-        bpy.utils.register_class(Act)  # and Python does not end; nor after bpy.app.handlers.save_pre.append(print)
+            def execute(self, context):
+                return {"FINISHED"}
+        bpy.utils.register_class(Act)  # Python does not end, nor after this:
+
+        import bpy
+        def act(*_): pass
+        bpy.app.handlers.save_pre.append(act)
     """
     shutil.rmtree(os.environ["BLENDER_USER_RESOURCES"], ignore_errors=True)
     if "bpy" in sys.modules and _EXIT_STATUS in config.stash:
