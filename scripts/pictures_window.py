@@ -18,6 +18,8 @@ from mathutils import Euler
 sys.path.insert(0, os.environ["FMQM_ROOT"])
 DRAWN = 6  # seconds until a change is on the screen, drawn by software
 DISTANCE = 1.5  # between the two urns
+SCALE = 0.8  # of the interface, so that the sidebar shows what is below the results
+UNIT = 9000  # how many of the metric's color units into the list: an edge in the ornament
 
 
 def view() -> tuple[bpy.types.Window, bpy.types.Area]:
@@ -35,6 +37,7 @@ def start() -> None:
     import fmqm_addon
 
     fmqm_addon.register()
+    bpy.context.preferences.view.ui_scale = SCALE
     for object_ in list(bpy.data.objects):
         bpy.data.objects.remove(object_)
     for level, path in enumerate(json.loads(os.environ["FMQM_URNS"])):
@@ -66,8 +69,8 @@ def units() -> None:
     shown = bpy.context.scene.fmqm.look
     shown.range, shown.point_size = "FIXED", 1.0
     look_from(25, (0.6, 0, 0.7), 4.0)
-    for _ in range(40):
-        bpy.ops.fmqm.unit_step(step=1)
+    bpy.ops.fmqm.unit_step(step=1)
+    bpy.ops.fmqm.unit_step(step=UNIT)
 
 
 def slice_() -> None:
