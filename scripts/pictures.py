@@ -118,8 +118,7 @@ def main() -> None:
     shutil.copy(out / "demo.png", args.docs / "demo.png")
     report = picture_of_report(out, urns[0])
     for picture in (*([report] if report else []), *pictures_of_window(out, *urns)):
-        small = Image.open(picture).convert("RGB").quantize(256, dither=Image.Dither.NONE)
-        small.save(args.docs / picture.name, optimize=True)
+        Image.open(picture).convert("RGB").save(args.docs / picture.name, optimize=True)
     print(f"the pictures are in {args.docs}")
 
 
