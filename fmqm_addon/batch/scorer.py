@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from ..cli.process import blender_version
 from ..cli.stops import stops_wait
 from ..metric.errors import (
     FileError,
@@ -20,6 +21,7 @@ from ..metric.errors import (
     OutsideError,
     one_line,
 )
+from ..provenance import provenance
 from ..report.explain import explain, where
 from ..report.html.pictures import picture_stem, write_pair_pictures
 from ..report.records import PairScore, pair_record
@@ -75,7 +77,7 @@ def work_off(shard: str, options: Options, stuck_after: float) -> None:
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise FileError(f"{shard}: no shard for a worker ({getattr(error, 'strerror', None) or error})") from error
     end_with_parent()
-    journal = Journal(journal_of(shard))
+    journal = Journal(journal_of(shard), made_by=options.made_by(provenance(blender_version())))
     log = _WorkersLog("", units_of(tasks), len(tasks), silent=True)
     score_tasks(tasks, options, journal, log, lambda: end_when_stuck(stuck_after))
     journal.close()

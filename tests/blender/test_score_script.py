@@ -96,7 +96,7 @@ def test_table(whole: Path) -> None:
 
 def test_json_has_exactly_the_promised_keys(whole: Path) -> None:
     document = read_json(whole / "all.json")
-    assert list(document) == ["fmqm_version", "blender_version", "settings", "pairs"]
+    assert list(document) == ["fmqm_version", "fmqm_code", "blender_version", "settings", "pairs"]
     assert set(document["settings"]) - PLACING == {flag.replace("-", "_") for flag in SETTING_FLAGS}
     (pair,) = document["pairs"]
     assert keys(pair) == PAIR_KEYS and list(pair["seconds"]) == list(STAGES)
