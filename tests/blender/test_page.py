@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import json
 import re
 import sys
@@ -205,6 +207,23 @@ def test_names_from_strangers_stay_text() -> None:
     assert [tag for tag, _ in shown.tags] == [tag for tag, _ in harmless.tags]
     assert shown.count("script") == 1 and shown.text.count(HOSTILE) > 10
     assert "<script>alert" not in shown.html
+
+
+def test_numbers_from_strangers_stay_text() -> None:
+    """Where they are not checked before, as merging does."""
+    for pictures in (costs(10, 1 << 20) | {"size": ['4" onload="alert(1)', '"><script>alert(1)</script>']},):
+        shown = Page(record(pictures=pictures))
+        assert shown.count("script") == 1 and "<script>alert" not in shown.html
+        assert not any(name.startswith("on") for _, attributes in shown.tags for name in attributes)
+
+
+def test_the_policy_names_the_pages_own_script_alone() -> None:
+    html = Page(record()).html
+    (policy,) = re.findall(r'Content-Security-Policy" content="([^"]*)"', html)
+    (script,) = re.findall(r"<script>(.*?)</script>", html, re.DOTALL)
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    assert f"script-src 'sha256-{digest}'" in policy and policy.startswith("default-src 'none'; base-uri 'none'")
+    assert "onclick" not in html
 
 
 def test_pairs_are_told_apart_by_their_names() -> None:
