@@ -13,9 +13,9 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, Po
 
 from ..blender.scene.members import is_measured
 from ..comparison.alignment import SPACES
-from ..metric.evaluation import COLUMNS
 from ..metric.settings import FAST_SCORED_PATCHES, SETTING_NAMES, Settings
 from ..report.trust_table import Report
+from . import stored_text
 
 SEED_LIMIT = 2**31 - 1  # of an IntProperty
 CUSTOM = "CUSTOM"
@@ -96,38 +96,32 @@ def active_row(scene: bpy.types.Scene) -> FMQMRow | None:
 
 def row_scores(row: FMQMRow) -> dict[str, float] | None:
     """The five scores by the names of metric.evaluation.COLUMNS, in double precision; None for a row with an error."""
-    return _columns(row.scores)
+    return stored_text.read_columns(row.scores)
 
 
 def row_stderr(row: FMQMRow) -> dict[str, float] | None:
     """Standard errors of the scores over the seeds; None for one seed."""
-    return _columns(row.stderr)
+    return stored_text.read_columns(row.stderr)
 
 
 def row_reverse(row: FMQMRow) -> dict[str, float] | None:
     """Scores of the other direction, the compared as the reference; None where they were not measured."""
-    return _columns(row.reverse)
+    return stored_text.read_columns(row.reverse)
 
 
 def row_attribution(row: FMQMRow) -> dict[str, Any] | None:
     """Whose loss it is, as comparison.attribution.Attribution.as_dict has it; None where that was not measured."""
-    found: dict[str, Any] | None = json.loads(row.attribution) if row.attribution else None
-    return found
+    return stored_text.read_attribution(row.attribution)
 
 
 def row_trust(row: FMQMRow) -> Report | None:
     """The trust report of a row; None for a row with an error."""
-    report: Report | None = json.loads(row.trust) if row.trust else None
-    return report
+    return stored_text.read_trust(row.trust)
 
 
 def numbers_text(values: Any) -> str:
     """Doubles as the text that row_scores reads back bit by bit."""
     return json.dumps(np.asarray(values, np.float64).tolist())
-
-
-def _columns(text: str) -> dict[str, float] | None:
-    return dict(zip(COLUMNS, json.loads(text), strict=True)) if text else None
 
 
 def _preset_chosen(settings: FMQMSettings, _: bpy.types.Context) -> None:

@@ -3,21 +3,21 @@
 
 from __future__ import annotations
 
-import json
 import os
 from typing import Any, ClassVar
 
 import bpy
 from bpy.props import EnumProperty, StringProperty
 
-from .. import VERSION
 from ..metric.errors import FMQMError
 from ..metric.evaluation import Scores
 from ..metric.settings import PRESETS, SETTING_NAMES, Settings
+from ..provenance import provenance
 from ..report.atomic_files import write_text
 from ..report.npz import save_fields
-from ..report.records import SHOWN, PairScore, csv_text, json_text, table_text
-from . import session, stale
+from ..report.record_check import record_fault
+from ..report.records import SHOWN, PairScore, csv_text, json_text, pair_record, table_text
+from . import session, stale, stored_text
 from .properties import FMQMRow, active_row, row_attribution, row_reverse, row_scores, row_stderr, row_trust
 
 # What an artist should know of each number: label, and what a low value looks like.
@@ -46,6 +46,8 @@ assert set(EXPLAINED) == set(SHOWN)
 def settings_name(row: FMQMRow) -> str:
     """The preset that a row was measured with, or Custom."""
     used = _settings_that_count(row)
+    if used is None:
+        return "?"
     for name, values in PRESETS.items():
         preset = Settings(**values).as_dict()
         if all(preset[each] == value for each, value in used.items()):
@@ -58,9 +60,24 @@ def comparable(row: FMQMRow, other: FMQMRow) -> bool:
     return row.settings == other.settings or _settings_that_count(row) == _settings_that_count(other)
 
 
-def _settings_that_count(row: FMQMRow) -> dict[str, Any]:
-    used = json.loads(row.settings)
-    return {name: used[name] for name in SETTING_NAMES if name != "seed"}
+def _settings_that_count(row: FMQMRow) -> dict[str, Any] | None:
+    used = stored_text.read_settings(row.settings)
+    return None if used is None else {name: used[name] for name in SETTING_NAMES if name != "seed"}
+
+
+def is_whole(row: FMQMRow) -> bool:
+    """Whether all that a row holds can be read; whoever sent the file may have written something else there."""
+    readers = (
+        (row.scores, stored_text.read_columns),
+        (row.stderr, stored_text.read_columns),
+        (row.reverse, stored_text.read_columns),
+        (row.attribution, stored_text.read_attribution),
+        (row.trust, stored_text.read_trust),
+        (row.settings, stored_text.read_settings),
+        (row.stages, stored_text.read_stages),
+    )
+    readable = stored_text.read_settings(row.settings) and all(read(text) is not None for text, read in readers if text)
+    return bool(readable) and not record_fault(pair_record(pair_of(row)))
 
 
 def pair_of(row: FMQMRow) -> PairScore:
@@ -74,7 +91,7 @@ def pair_of(row: FMQMRow) -> PairScore:
         stderr=_scores(row_stderr(row)),
         patches=row.patches or None,
         samples=row.samples or None,
-        seconds=json.loads(row.stages or "{}"),
+        seconds=stored_text.read_stages(row.stages) or {},
         warnings=tuple(row.warnings.splitlines()),
         error=row.error or None,
         space=row.space or None,
@@ -93,6 +110,10 @@ def _has_rows(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool
         cls.poll_message_set("Nothing has been measured yet")
         return False
     return True
+
+
+def _broken_text(count: int) -> str:
+    return f"; {count} left out, which cannot be read" if count else ""
 
 
 class FMQM_OT_sort_rows(bpy.types.Operator):  # noqa: N801
@@ -118,7 +139,11 @@ class FMQM_OT_sort_rows(bpy.types.Operator):  # noqa: N801
         fmqm = context.scene.fmqm
         chosen = active_row(context.scene)
         chosen_uid = chosen.uid if chosen else ""
-        values = {row.uid: scores[self.column] for row in fmqm.rows if (scores := row_scores(row)) is not None}
+        values = {
+            row.uid: scores[self.column]
+            for row in fmqm.rows
+            if (scores := row_scores(row)) is not None and is_whole(row)
+        }
         now = list(values)
         order = sorted(now, key=values.__getitem__, reverse=True)
         if order == now:
@@ -142,7 +167,8 @@ class FMQM_OT_remove_row(bpy.types.Operator):  # noqa: N801
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         fmqm = context.scene.fmqm
-        fmqm.rows.remove(fmqm.row_index)
+        if active_row(context.scene) is not None:
+            fmqm.rows.remove(fmqm.row_index)
         fmqm.row_index = max(0, min(fmqm.row_index, len(fmqm.rows) - 1))
         return {"FINISHED"}
 
@@ -175,9 +201,11 @@ class FMQM_OT_copy_results(bpy.types.Operator):  # noqa: N801
         return _has_rows(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        context.window_manager.clipboard = table_text([pair_of(row) for row in context.scene.fmqm.rows])
-        number = len(context.scene.fmqm.rows)
-        self.report({"INFO"}, "1 result copied" if number == 1 else f"{number} results copied")
+        rows = [row for row in context.scene.fmqm.rows if is_whole(row)]
+        context.window_manager.clipboard = table_text([pair_of(row) for row in rows])
+        number = len(rows)
+        broken = _broken_text(len(context.scene.fmqm.rows) - number)
+        self.report({"INFO"}, ("1 result copied" if number == 1 else f"{number} results copied") + broken)
         return {"FINISHED"}
 
 
@@ -230,23 +258,28 @@ class FMQM_OT_save_results(bpy.types.Operator):  # noqa: N801
         row = active_row(context.scene) or fmqm.rows[0]
         path = bpy.path.abspath(self._with_suffix())
         # One file tells of one set of settings: scores at others do not compare.
-        rows = [other for other in fmqm.rows if other.settings == row.settings]
+        alike = [other for other in fmqm.rows if other.settings == row.settings]
+        rows = [other for other in alike if is_whole(other)]
         try:
             if self.file_format == "npz":
                 measured = session.get(row.uid)
                 if measured is None:
                     raise FMQMError(f"{row.name}: the samples are not in memory any more; measure again")
                 save_fields(path, measured.comparison.result)
+            elif not rows:
+                raise FMQMError(f"{row.name}: this result cannot be read; measure again")
             elif self.file_format == "csv":
                 write_text(path, csv_text([pair_of(other) for other in rows]))
             else:
-                versions = {"fmqm_version": VERSION, "blender_version": bpy.app.version_string}
-                write_text(path, json_text([pair_of(other) for other in rows], json.loads(row.settings), versions))
+                settings = stored_text.read_settings(row.settings) or {}
+                versions = provenance(bpy.app.version_string)
+                write_text(path, json_text([pair_of(other) for other in rows], settings, versions))
         except FMQMError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        left_out = len(fmqm.rows) - len(rows)
-        tail = f"; {left_out} measured with other settings left out" if left_out and self.file_format != "npz" else ""
+        left_out = len(fmqm.rows) - len(alike)
+        tail = f"; {left_out} measured with other settings left out" if left_out else ""
+        tail = "" if self.file_format == "npz" else tail + _broken_text(len(alike) - len(rows))
         self.report({"INFO"}, f"Saved {os.path.basename(path)}{tail}")
         return {"FINISHED"}
 
