@@ -41,7 +41,6 @@ from fmqm_addon.cli.process import (
     prepare_bpy,
     run_script,
 )
-from fmqm_addon.cli.stops import stops_wait
 from fmqm_addon.comparison.alignment import SPACES
 from fmqm_addon.folders import TEMPORARY, own_folder, sweep
 from fmqm_addon.metric.errors import FileError, FMQMError, SettingsError
@@ -51,11 +50,11 @@ from fmqm_addon.report.atomic_files import STDOUT, check_apart, check_writable, 
 from fmqm_addon.report.explain import explain
 from fmqm_addon.report.html.page import PAGE, write_page
 from fmqm_addon.report.html.pictures import has_pictures, open_report_folder
-from fmqm_addon.report.junit import below, junit_parts, shortfall
-from fmqm_addon.report.records import csv_parts, json_parts, table_parts, trust_parts
+from fmqm_addon.report.junit import junit_parts
+from fmqm_addon.report.records import below, csv_parts, json_parts, shortfall, table_parts, trust_parts
 
 if TYPE_CHECKING:
-    from fmqm_addon.comparison.pair import Answer
+    from fmqm_addon.comparison.pair import PairResult
 
 PROGRAM = "score.py"
 _STRANGERS = 600.0  # seconds that a pair of strangers' files may take
@@ -254,7 +253,7 @@ def main(argv: Sequence[str], out: TextIO) -> int:
             raise FMQMError("a worker without a shard; this is a fault of the program")
         if args.worker:
             prepare_bpy()
-            work_off(args.worker, options, limits.timeout)
+            work_off(args.worker, options, provenance(blender_version()), limits.timeout)
             return OK
         rows = _rows(args, options)
         outputs = _outputs(args)
@@ -462,7 +461,7 @@ def _write(
     records: Iterable[Mapping[str, Any]],
     settings: Mapping[str, Any],
     versions: Mapping[str, str],
-    last: Answer | None,
+    last: PairResult | None,
     out: TextIO,
 ) -> None:
     """What is to be known before the scores are believed, then the files, and in any case what is printed."""
@@ -487,9 +486,9 @@ def _write(
         print_parts(out, _table_parts(args, records) if alone is None else alone)
 
 
-def _write_last(args: argparse.Namespace, last: Answer) -> None:
+def _write_last(args: argparse.Namespace, last: PairResult) -> None:
     from fmqm_addon.report.npz import save_fields
-    from fmqm_addon.report.render import write_picture
+    from fmqm_addon.report.sheet import write_picture
 
     result = last.comparison.result
     if args.save_fields:

@@ -20,7 +20,7 @@ class Options:
     """How all pairs of a run are scored.
 
     Attributes:
-        settings: of the metric, before a row's own. repeats: seeds. space, match_scale: as comparison.alignment.place.
+        settings: of the metric, before a row's own. repeats: seeds. space, match_scale: as comparison.alignment.align.
         attribution: whose loss it is, too. explain: in words, too.
         report: folder of the report, for pictures; "" makes none. It changes no score.
         both: the other direction, too.

@@ -22,14 +22,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..cli.process import TEMPORARY_PLACES, WORKER
-from ..cli.stops import stops_wait
+from ..folders import TEMPORARY_PLACES
 from ..metric.errors import FileError, FMQMError
+from .interrupt import stops_wait
 from .journal import Journal, own_record, parse_line
 from .progress_log import Log
 from .rows import Task, grouped
 
 NOTE = "note: "  # begins a line that a worker prints for this process's log
+WORKER = "FMQM_WORKER"  # set in the environment of workers
 TRIES = 2  # a pair that ends its worker is tried once more
 _POLL = 0.1  # seconds between looks at the workers
 _WORTHWHILE = 5.0  # seconds of work that a worker is started for, at least

@@ -32,7 +32,7 @@ class PairScore:
         scores, stderr: None where there are none.
         seconds: by STAGES; what several pairs share is counted in the first.
         error: why there are no scores.
-        space: where the two were compared, as comparison.alignment.Placement.label has it.
+        space: where the two were compared, as comparison.alignment.Alignment.label has it.
         reverse: scores of the other direction, the distorted mesh as the reference; None: not asked for.
         trust: as report.trust_table.trust_dict has it.
         findings: what else was asked for, by its key in the record: where, attribution, pictures.
@@ -54,14 +54,17 @@ class PairScore:
 
 
 def json_text(pairs: Sequence[PairScore], settings: dict[str, Any], versions: dict[str, str]) -> str:
+    """The JSON document of pairs; as json_parts."""
     return "".join(json_parts(map(pair_record, pairs), settings, versions))
 
 
 def csv_text(pairs: Sequence[PairScore]) -> str:
+    """The CSV of pairs; as csv_parts."""
     return "".join(csv_parts([pair_record(pair) for pair in pairs]))
 
 
 def table_text(pairs: Sequence[PairScore]) -> str:
+    """The table of pairs; as table_parts."""
     return "".join(table_parts([pair_record(pair) for pair in pairs]))
 
 
@@ -142,6 +145,19 @@ def pair_record(pair: PairScore) -> dict[str, Any]:
         "trust": pair.trust,
         **pair.findings,
     }
+
+
+def below(record: Mapping[str, Any]) -> bool:
+    """Whether a scored pair misses its threshold."""
+    return record["FMQM"] is not None and record["FMQM"] < (record["fail_under"] or 0)
+
+
+def shortfall(record: Mapping[str, Any]) -> str:
+    """By how much a pair that is below its threshold misses it; with so many digits that it shows."""
+    shown = f"{record['FMQM']:.4f}"
+    if float(shown) >= record["fail_under"]:
+        shown = repr(record["FMQM"])
+    return f"FMQM {shown} is below {record['fail_under']:g}"
 
 
 def _any_reverse(records: Iterable[Mapping[str, Any]]) -> bool:

@@ -8,7 +8,7 @@ from typing import ClassVar
 import bpy
 from bl_ui.utils import PresetPanel
 
-from ..comparison.alignment import PLACE_LABELS
+from ..comparison.alignment import SPACE_LABELS
 from ..metric.evaluation import COLUMNS
 from ..report.records import SHOWN
 from ..report.trust_table import Line, trust_lines
@@ -30,7 +30,7 @@ from .scene import FMQMScene
 
 _WIDE = 330  # pixels at scale 1: from here on the rows have room for the four features
 _CHARACTER = 6.6  # pixels at scale 1, of the panel's font, about
-_SHORT_SPACE = {PLACE_LABELS["location"]: "Origins Aligned"}
+_SHORT_SPACE = {SPACE_LABELS["location"]: "Origins Aligned"}
 NOT_SEEN = "Normal maps, roughness and lighting are not part of FMQM"
 
 

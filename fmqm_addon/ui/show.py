@@ -17,7 +17,10 @@ from ..metric.errors import FMQMError
 from ..metric.evaluation import Result
 from ..metric.fields import Fields
 from ..metric.geometry import Floats, Ints, cross
-from ..report.visual import layers, probe
+from ..report.visual import layers
+from ..report.visual.shells import SHELLS, fields_at, shell_points, slice_points
+from ..report.visual.units import unit_grid, unit_lines, unit_of
+from ..report.visual.worst import patch_view, worst_patches
 from . import overlay, properties, session
 
 if TYPE_CHECKING:
@@ -254,7 +257,7 @@ def recolor_painted(scene: bpy.types.Scene) -> None:
     result, distorted = measured.comparison.result, measured.comparison.distorted
     length = world_length(measured)
     if layers.LAYERS[look.layer].per_patch:
-        values = probe.blended_scores(result, look.layer)
+        values = layers.blended_scores(result, look.layer)
     else:
         values = layers.field_values(look.layer, *_fields_of_vertices(painted[_UID], measured), length)
     fitted_to = layers.layer_values(result, look.layer) if layers.LAYERS[look.layer].per_patch else values
@@ -270,7 +273,7 @@ def _fields_of_vertices(uid: str, measured: session.Measured) -> tuple[Fields, F
         _painted_fields.clear()
         vertices = measured.comparison.result.patch_mesh.vertices
         surfaces = (measured.reference, measured.comparison.distorted)
-        _painted_fields[uid] = (probe.fields_at(surfaces[0], vertices), probe.fields_at(surfaces[1], vertices))
+        _painted_fields[uid] = (fields_at(surfaces[0], vertices), fields_at(surfaces[1], vertices))
     return _painted_fields[uid]
 
 
@@ -309,7 +312,7 @@ def focus_patch(scene: bpy.types.Scene, area: bpy.types.Area | None) -> None:
     size = look.point_size * POINT * cloud[_SPACING]
     scene_objects.resize(cloud, size, result.samples.patch == patch)
     look.focused = True
-    center, diameter, normal = probe.patch_view(result, patch)
+    center, diameter, normal = patch_view(result, patch)
     matrix = cloud_matrix(measured, look.place)
     turned = np.linalg.inv(matrix[:3, :3]).T @ normal
     length = float(np.linalg.norm(turned))
@@ -344,7 +347,7 @@ def _fill_worst(look: FMQMLook, result: Result, uid: str) -> None:
     if look.worst_uid == uid and len(look.worst):
         return
     look.worst.clear()
-    for worst in probe.worst_patches(result, WORST_COUNT):
+    for worst in worst_patches(result, WORST_COUNT):
         item = look.worst.add()
         item.name = f"Patch {worst.patch}"
         item.patch, item.score, item.value = worst.patch, worst.score, worst.value
@@ -371,7 +374,7 @@ def _build_shells(scene: bpy.types.Scene) -> bpy.types.Object:
     uid, _, measured = measured_row(scene)
     look = look_of(scene)
     surface = measured.reference if look.shell_field == "REFERENCE" else measured.comparison.distorted
-    shells = probe.shell_points(surface, look.shell_points, look.shell_distance / 100)
+    shells = shell_points(surface, look.shell_points, look.shell_distance / 100)
     positions = shells.positions.copy()
     low, high = positions.min(axis=0), positions.max(axis=0)
     shown = np.ones(len(positions), bool)
@@ -379,8 +382,8 @@ def _build_shells(scene: bpy.types.Scene) -> bpy.types.Object:
         positions[:, 0] += shells.shell * 1.1 * float(high[0] - low[0])
     else:  # each shell ends before the one below it, so that all five are seen
         place = (positions[:, 0] - low[0]) / max(float(high[0] - low[0]), 1e-12)
-        shown = place <= 1 - shells.shell / probe.SHELLS
-    colors = probe.fields_at(surface, shells.positions[shown]).ncf
+        shown = place <= 1 - shells.shell / SHELLS
+    colors = fields_at(surface, shells.positions[shown]).ncf
     area = float(measured.comparison.result.patch_mesh.area)
     object_ = scene_objects.build_cloud(
         scene,
@@ -396,7 +399,7 @@ def _build_shells(scene: bpy.types.Scene) -> bpy.types.Object:
     scene_objects.recolor(object_, colors.astype(np.float64))
     step = world_length(measured) * look.shell_distance / 100
     legend = layers.Legend(
-        f"{probe.SHELLS} Shells of {surface.name}",
+        f"{SHELLS} Shells of {surface.name}",
         f"{_length_text(scene, step)} apart",
         note="colors as in the textures",
     )
@@ -437,9 +440,9 @@ def draw_slice(scene: bpy.types.Scene) -> None:
     look = look_of(scene)
     resolution = plane.data.size[0]
     to_frame = np.linalg.inv(cloud_matrix(measured, "REFERENCE")) @ np.array(plane.matrix_world, np.float64)
-    points = probe.slice_points(to_frame, resolution)
-    ref = probe.fields_at(measured.reference, points)
-    dist = probe.fields_at(measured.comparison.distorted, points)
+    points = slice_points(to_frame, resolution)
+    ref = fields_at(measured.reference, points)
+    dist = fields_at(measured.comparison.distorted, points)
     length = world_length(measured)
     values = layers.field_values(look.slice_layer, ref, dist, length)
     ends = layers.value_range(look.slice_layer, values, look.range == "FITTED", length)
@@ -480,19 +483,19 @@ def show_unit(scene: bpy.types.Scene, sample: int) -> None:
     uid, name, measured = measured_row(scene)
     result = measured.comparison.result
     sample %= len(result.samples.positions)
-    unit = probe.unit_of(result, sample)
+    unit = unit_of(result, sample)
     pictures = []
     for tangent in (False, True):
         for surface, fields in ((measured.reference, result.ref), (measured.comparison.distorted, result.dist)):
-            pixels, inside, dots, members = probe.unit_grid(result, unit, tangent, FIGURE_SIDE)
+            pixels, inside, dots, members = unit_grid(result, unit, tangent, FIGURE_SIDE)
             colors = np.zeros((FIGURE_SIDE * FIGURE_SIDE, 4), np.float32)
-            colors[inside, :3] = probe.fields_at(surface, pixels[inside]).ncf
+            colors[inside, :3] = fields_at(surface, pixels[inside]).ncf
             colors[inside, 3] = 1.0
             shape = (FIGURE_SIDE, FIGURE_SIDE, 4)
             pictures.append(overlay.UnitPicture(colors.reshape(shape), dots, fields.ncf[members].astype(np.float64)))
     look = look_of(scene)
     matrix = cloud_matrix(measured, look.place)
-    lines = probe.unit_lines(result, unit) @ matrix[:3, :3].T + matrix[:3, 3]
+    lines = unit_lines(result, unit) @ matrix[:3, :3].T + matrix[:3, 3]
     title = f"Sample {sample} of {name}"
     overlay.figure = overlay.UnitFigure(title, tuple(pictures), uid, scene.name, lines)  # type: ignore[arg-type]
     look.unit_sample = sample

@@ -198,7 +198,7 @@ PARENT = """
 import sys
 from pathlib import Path
 sys.path.insert(0, sys.argv[1])
-from fmqm_addon.cli.stops import stop_on_signals
+from fmqm_addon.batch.interrupt import stop_on_signals
 from tests.batch.test_workers import tasks_of, watch
 stop_on_signals()  # as score.py
 try:

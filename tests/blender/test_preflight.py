@@ -12,7 +12,7 @@ import bpy
 import pytest
 
 from fmqm_addon.blender.files import preflight_packed
-from fmqm_addon.blender.files.load import load_placed
+from fmqm_addon.blender.files.load import load_asset
 from fmqm_addon.blender.files.preflight_file import check_file
 from fmqm_addon.blender.scene import mesh_arrays
 from fmqm_addon.metric.errors import FileError, MeshError
@@ -90,7 +90,7 @@ def test_honest_files_pass(tmp_path: Path, kind: str) -> None:
     else:
         path = str(scenes.export(tmp_path, kind))
     scenes.clear()
-    assert len(load_placed(path).mesh.triangles) == 12
+    assert len(load_asset(path).mesh.triangles) == 12
 
 
 def test_instances_that_multiply_triangles(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -101,4 +101,4 @@ def test_instances_that_multiply_triangles(monkeypatch: pytest.MonkeyPatch, tmp_
     path = str(scenes.export(tmp_path, "blend"))
     scenes.clear()
     with pytest.raises(MeshError, match="show more than 30 triangles"):
-        load_placed(path)
+        load_asset(path)

@@ -10,8 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from blender.script import SMALL, noise, score, write_png, write_torus
 from chromium import Page
+
+from tests.blender.script import SMALL, noise, score, write_png, write_torus
 
 pytestmark = [pytest.mark.browser, pytest.mark.once]
 

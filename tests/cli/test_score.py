@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from . import scenes
-from .script import (
+from tests.blender import scenes
+from tests.blender.script import (
     COLUMNS,
     SCORE,
     SMALL,

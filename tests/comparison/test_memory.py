@@ -15,8 +15,7 @@ from fmqm_addon.comparison.memory import peak_bytes, peak_text
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.surface import MeshArrays
 from fmqm_addon.metric.texture import Material, Texture
-
-from .script import SCORE
+from tests.blender.script import SCORE
 
 SIDE = 400  # quads along the square: 320,000 triangles
 

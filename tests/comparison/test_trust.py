@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fmqm_addon.comparison.surface_facts import edge_counts, overlapping_share, surface_facts
 from fmqm_addon.comparison.trust import (
     ADDED,
     FLIPPED,
@@ -20,10 +21,7 @@ from fmqm_addon.comparison.trust import (
     assessing,
     covered_share,
     differing_maps,
-    edge_counts,
-    overlapping_share,
     spread_points,
-    surface_facts,
 )
 from fmqm_addon.metric.evaluation import Evaluation, Result
 from fmqm_addon.metric.geometry import Floats, Ints
@@ -31,9 +29,8 @@ from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.surface import MeshArrays, Surface, finish, join_meshes, prepare_surface, triangle_areas
 from fmqm_addon.metric.texture import ImageFacts, Material, PlainColor
 from fmqm_addon.report.trust_table import trust_dict, trust_lines, trust_text
-
-from .meshes import SMALL, TRIANGLE, cube, grid, mesh_arrays, moved, shaken, sphere, surface, texture
-from .oracles import NaiveQuery, squared_distances
+from tests.metric.meshes import SMALL, TRIANGLE, cube, grid, mesh_arrays, moved, shaken, sphere, surface, texture
+from tests.metric.oracles import NaiveQuery, squared_distances
 
 SQUARE = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], np.float64)  # two triangles' UVs
 GREY = PlainColor((0.5, 0.5, 0.5))

@@ -28,9 +28,9 @@ from fmqm_addon.report.html.chain_curve import Level, curve_svg
 from fmqm_addon.report.html.page import page_parts, write_page
 from fmqm_addon.report.html.pictures import open_report_folder, picture_stem, texture_bytes, write_pair_pictures
 from fmqm_addon.report.render import Camera, is_seen, render
+from tests.blender.script import COLUMNS, SMALL, noise, score, write_png, write_torus
 
-from .script import COLUMNS, SMALL, noise, score, write_png, write_torus
-from .test_picture import FEW, RED, compared, hue
+from .test_render import FEW, RED, compared, hue
 
 HOSTILE = "<script>alert(1)</script>&\"'\u202e.glb"
 SETTINGS = {"samples": 2000, "scored_patches": None, "centers": "fps"}

@@ -17,7 +17,11 @@ from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.surface import Frame, MeshArrays, Surface, prepare_surface
 from fmqm_addon.metric.texture import Material, Texture
 from fmqm_addon.report import render as rendering
-from fmqm_addon.report.render import Camera, render, score_by_face, score_colors, write_picture
+from fmqm_addon.report import sheet
+from fmqm_addon.report.labels import shorten
+from fmqm_addon.report.render import Camera, render, score_by_face
+from fmqm_addon.report.sheet import write_picture
+from fmqm_addon.report.visual.colormap import NO_PATCH, score_colors
 
 RED, GREEN, BLUE, YELLOW = (200, 20, 20), (20, 200, 20), (20, 20, 200), (200, 200, 20)
 FRONT = {"azimuth": 0.0, "elevation": 0.0}
@@ -96,7 +100,7 @@ def test_faces_have_the_mean_of_their_patches_and_grey_without() -> None:
     assert 0 < np.isnan(scores).sum() < len(scores)
 
     image = render(reference, Camera.framing(reference, **FRONT), (60, 60), score_colors(scores))
-    assert hue(image[30, 30]) == pytest.approx(hue(np.array(rendering.NO_PATCH)), abs=0.03)  # centers are far outside
+    assert hue(image[30, 30]) == pytest.approx(hue(np.array(NO_PATCH)), abs=0.03)  # centers are far outside
     corner = reference.vertices[result.patches[0].center]
     row, column_ = (4 if corner[2] > 0 else 55), (55 if corner[0] > 0 else 4)
     wanted = score_colors(result.patch_scores[:1, column])[0]
@@ -128,7 +132,7 @@ def test_score_colors_are_even_and_bad_is_bright() -> None:
     assert (np.diff(lab[:, 0]) < 0).all()
     steps = np.linalg.norm(np.diff(lab, axis=0), axis=1)
     assert steps.max() < 1.35 * steps.min()
-    assert score_colors(np.array([np.nan, 0.5]))[0] == pytest.approx(rendering.NO_PATCH)
+    assert score_colors(np.array([np.nan, 0.5]))[0] == pytest.approx(NO_PATCH)
 
 
 def test_png_decodes(tmp_path: Path) -> None:
@@ -164,7 +168,7 @@ def test_failure_leaves_the_old_file_alone(tmp_path: Path, monkeypatch: pytest.M
     def fail(*_: object) -> None:
         raise MemoryError
 
-    monkeypatch.setattr(rendering, "compose", fail)
+    monkeypatch.setattr(sheet, "compose", fail)
     with pytest.raises(MemoryError):
         write_picture(path, *pair)
     assert list(tmp_path.iterdir()) == [path] and path.read_text() == "an older picture"
@@ -184,5 +188,5 @@ def test_long_names_lose_their_middle() -> None:
     def fits(text: str) -> bool:
         return len(text) <= 12
 
-    assert rendering.shorten("short.glb", fits) == "short.glb"
-    assert rendering.shorten("a_very_long_name_of_a_file.glb", fits) == "a_ver....glb"
+    assert shorten("short.glb", fits) == "short.glb"
+    assert shorten("a_very_long_name_of_a_file.glb", fits) == "a_ver....glb"

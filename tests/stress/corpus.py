@@ -21,8 +21,9 @@ from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from fmqm_addon.blender.files.asset_path import SUFFIXES
 from tests.blender.hostile_files import all_files
+
+from fmqm_addon.blender.files.asset_path import SUFFIXES
 from tests.blender.script import COLUMNS, SCORE
 
 ROOT = Path(__file__).resolve().parents[2]

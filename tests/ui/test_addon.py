@@ -25,9 +25,8 @@ from fmqm_addon.metric.stepper import Progress, Stepper, Work
 from fmqm_addon.ui import inputs, measuring, panels, results, session, stale
 from fmqm_addon.ui.modal import SteppedOperator
 from fmqm_addon.ui.properties import item_target, metric_settings, row_scores
-
-from . import scenes
-from .script import read_json, score
+from tests.blender import scenes
+from tests.blender.script import read_json, score
 
 QUICK = Settings(samples=8_000, patches=40)
 
@@ -661,10 +660,10 @@ def test_stepping_needs_no_scene(lods: list[bpy.types.Object]) -> None:
     """Objects may be deleted, or the file replaced, once the first steps have read them."""
     from fmqm_addon.blender.scene.measure import measuring
     from fmqm_addon.blender.scene.target import target_of
-    from fmqm_addon.comparison.pair import Question
+    from fmqm_addon.comparison.pair import PairOptions
 
     expected = api.measure(lods[0], lods[1], QUICK)[0].scores
-    stepper = measuring(target_of(lods[0]), [target_of(lods[1])], Question(QUICK))
+    stepper = measuring(target_of(lods[0]), [target_of(lods[1])], PairOptions(QUICK))
     while stepper.progress.stage.startswith("Reading") or not stepper.progress.stage:
         assert stepper.step()
     bpy.data.objects.remove(lods[1])
@@ -675,9 +674,9 @@ def test_stepping_needs_no_scene(lods: list[bpy.types.Object]) -> None:
 def test_the_scene_changes_before_it_is_read(lods: list[bpy.types.Object]) -> None:
     from fmqm_addon.blender.scene.measure import measuring
     from fmqm_addon.blender.scene.target import target_of
-    from fmqm_addon.comparison.pair import Question
+    from fmqm_addon.comparison.pair import PairOptions
 
-    stepper = measuring(target_of(lods[0]), [target_of(lod) for lod in lods[1:]], Question(QUICK))
+    stepper = measuring(target_of(lods[0]), [target_of(lod) for lod in lods[1:]], PairOptions(QUICK))
     stepper.step()
     bpy.data.objects.remove(lods[2])
     outcomes = stepper.run()

@@ -15,6 +15,7 @@ import pytest
 
 import fmqm_addon
 from fmqm_addon.blender.display import scene_objects, viewport
+from fmqm_addon.blender.scene.bvh import BVHQuery
 from fmqm_addon.blender.scene.mesh_arrays import mesh_arrays
 from fmqm_addon.comparison.measurement import Comparison, Measurement
 from fmqm_addon.metric.colorspace import decode_srgb, srgb_to_lab
@@ -23,10 +24,12 @@ from fmqm_addon.metric.fields import Fields
 from fmqm_addon.metric.geometry import dot
 from fmqm_addon.metric.sampling import Samples
 from fmqm_addon.metric.settings import Settings
-from fmqm_addon.report.visual import colormap, layers, probe
+from fmqm_addon.report.visual import colormap, layers
+from fmqm_addon.report.visual.shells import SHELLS, fields_at, shell_points, slice_points
+from fmqm_addon.report.visual.units import unit_grid, unit_of
+from fmqm_addon.report.visual.worst import worst_patches
 from fmqm_addon.ui import overlay, session, show
-
-from . import scenes
+from tests.blender import scenes
 
 FEW = Settings(samples=1600, patches=16)
 SHIFT = np.array([[1.0, 0, 0, 10], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
@@ -41,7 +44,7 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> session.Measured:
     b = scenes.monkey("Monkey_LOD1", [scenes.textured(image)])
     b.scale.z *= 0.9
     bpy.context.view_layer.update()
-    measurement = Measurement(mesh_arrays([a], a.name), FEW)
+    measurement = Measurement(mesh_arrays([a], a.name), BVHQuery, FEW)
     measurement.prepare().run()
     comparison = measurement.compare(mesh_arrays([b], b.name)).run()
     return session.Measured(measurement.reference, comparison, np.eye(4), SHIFT)
@@ -151,7 +154,7 @@ def test_worst_patches_name_who_is_to_blame(measured: session.Measured) -> None:
     scores[2] = [0.9, 0.45, 0.9, 0.4, 0.3]
     scores[0] = [0.9, 0.9, 0.9, 0.1, 0.2]
     result = dataclasses.replace(measured.comparison.result, patch_scores=scores, scores=Scores(*scores.mean(axis=0)))
-    worst = probe.worst_patches(result, 3)
+    worst = worst_patches(result, 3)
     assert [(w.patch, w.blame, w.value) for w in worst[:2]] == [(0, "colorGraSSIM", 0.1), (2, "geoGraSSIM", 0.45)]
     assert [w.patch for w in worst] == [0, 2, 1]
 
@@ -161,20 +164,20 @@ def test_worst_patches_name_who_is_to_blame(measured: session.Measured) -> None:
 
 def test_painted_scores_lie_between_those_of_the_patches(measured: session.Measured) -> None:
     result = measured.comparison.result
-    values = probe.blended_scores(result, "FMQM")
+    values = layers.blended_scores(result, "FMQM")
     scores = result.patch_scores[:, 4]
     assert len(values) == len(result.patch_mesh.vertices)
     assert scores.min() <= values.min() and values.max() <= scores.max() and values.std() > 0
     alike = dataclasses.replace(result, patch_scores=np.full_like(result.patch_scores, 0.7))
-    assert probe.blended_scores(alike, "FMQM") == pytest.approx(0.7)
-    numbers = probe.blended_scores(result, "PATCH")
+    assert layers.blended_scores(alike, "FMQM") == pytest.approx(0.7)
+    numbers = layers.blended_scores(result, "PATCH")
     assert numbers[[patch.center for patch in result.patches]].tolist() == list(range(len(result.patches)))
 
 
 def test_shells_stand_at_their_distances(measured: session.Measured) -> None:
-    shells = probe.shell_points(measured.reference, 500, 0.01)
-    assert np.bincount(shells.shell).tolist() == [500] * probe.SHELLS
-    fields = probe.fields_at(measured.reference, shells.positions)
+    shells = shell_points(measured.reference, 500, 0.01)
+    assert np.bincount(shells.shell).tolist() == [500] * SHELLS
+    fields = fields_at(measured.reference, shells.positions)
     assert np.abs(fields.sdf[:500]).max() < 1e-6
     assert (np.abs(fields.sdf) <= 0.01 * shells.shell + 1e-6).all()
 
@@ -183,7 +186,7 @@ def test_units_are_the_metrics(measured: session.Measured) -> None:
     result = measured.comparison.result
     samples = result.samples
     for sample in np.flatnonzero(samples.unit)[::300].tolist():
-        unit = probe.unit_of(result, sample)
+        unit = unit_of(result, sample)
         here = np.flatnonzero(samples.patch == samples.patch[sample])
         offset = samples.positions[here] - samples.positions[sample]
         distance = np.linalg.norm(offset, axis=1)
@@ -193,14 +196,14 @@ def test_units_are_the_metrics(measured: session.Measured) -> None:
         assert sorted(unit.normal) == sorted([sample, *here[within & (cosine > 0.95)]])
         assert sorted(unit.tangent) == sorted([sample, *here[within & (cosine < 0.05)]])
         for tangent in (False, True):
-            pixels, inside, dots, members = probe.unit_grid(result, unit, tangent, 16)
+            pixels, inside, dots, members = unit_grid(result, unit, tangent, 16)
             assert inside.any() and (np.abs(dots) <= 1).all() and len(dots) == len(members)
             gap = pixels[inside] - samples.positions[sample]
             assert np.sqrt(dot(gap, gap)).max() <= unit.radius
 
 
 def test_slice_points_are_the_centers_of_pixels() -> None:
-    points = probe.slice_points(SHIFT, 2)
+    points = slice_points(SHIFT, 2)
     assert points.tolist() == [[9.75, -0.25, 0], [10.25, -0.25, 0], [9.75, 0.25, 0], [10.25, 0.25, 0]]
 
 

@@ -20,8 +20,7 @@ import numpy as np
 
 from ...metric.geometry import Floats
 from ..atomic_files import write_parts
-from ..junit import below
-from ..records import SHOWN
+from ..records import SHOWN, below
 from ..trust_table import Report, trust_lines
 from ..visual.colormap import NO_PATCH, score_colors
 from .chain_curve import Level, curve_svg

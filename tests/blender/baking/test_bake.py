@@ -15,7 +15,7 @@ import pytest
 
 from fmqm_addon.blender.baking import bake
 from fmqm_addon.blender.baking.bake import Baked, bake_slots
-from fmqm_addon.blender.materials.image_headers import Limits
+from fmqm_addon.blender.materials.image_headers import ImageLimits
 from fmqm_addon.blender.materials.types import Reading, Unread
 from fmqm_addon.blender.scene.bvh import BVHQuery
 from fmqm_addon.blender.scene.mesh_arrays import mesh_arrays
@@ -23,8 +23,7 @@ from fmqm_addon.metric.colorspace import decode_srgb, encode_srgb
 from fmqm_addon.metric.errors import MeshError
 from fmqm_addon.metric.surface import prepare_surface
 from fmqm_addon.metric.texture import Texture
-
-from . import scenes
+from tests.blender import scenes
 
 CLOSE = 1.5 / 255
 RED, GREEN = (0.9, 0.1, 0.1), (0.1, 0.9, 0.1)
@@ -727,12 +726,13 @@ import sys
 sys.path[:0] = [sys.argv[1]]
 from fmqm_addon.cli.process import take_stdout
 out = take_stdout()
-from tests.blender import scenes, test_bake
+from tests.blender import scenes
+from tests.blender.baking import test_bake
 scenes.clear()
 test_bake.baked(scenes.cube(materials=[test_bake.procedural()]), 32)
 print("only this", file=out, flush=True)
 """
-    root = str(Path(__file__).resolve().parents[2])
+    root = str(Path(__file__).resolve().parents[3])
     done = subprocess.run([sys.executable, "-c", program, root], capture_output=True, text=True, check=True)
     assert done.stdout == "only this\n"
 
@@ -799,4 +799,4 @@ def test_missing_images_are_no_secret_of_the_baker(tmp_path: Path) -> None:
 def test_huge_images_are_not_decoded_for_the_baker(tmp_path: Path) -> None:
     object_ = scenes.square(materials=[inverted(scenes.write_png(tmp_path / "image.png", scenes.noise(40)))])
     with pytest.raises(MeshError, match=r"image\.png: the image promises 40 x 40 pixels, more than the 32 a side"):
-        mesh_arrays([object_], "asset", Reading(limits=Limits(side=32)))
+        mesh_arrays([object_], "asset", Reading(limits=ImageLimits(side=32)))

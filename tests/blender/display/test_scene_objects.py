@@ -9,8 +9,7 @@ import pytest
 
 from fmqm_addon.blender.display import scene_objects, viewport
 from fmqm_addon.metric.colorspace import decode_srgb
-
-from . import scenes
+from tests.blender import scenes
 
 POSITIONS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 2, 0]])
 UP = np.array([[0.0, 0, 1]] * 3)

@@ -15,15 +15,16 @@ from pathlib import Path
 import bpy
 import pytest
 
-from fmqm_addon.blender.files.load import SUFFIXES, load_placed
-from fmqm_addon.comparison.alignment import place
+from fmqm_addon.blender.files.load import SUFFIXES, load_asset
+from fmqm_addon.blender.scene.bvh import BVHQuery
+from fmqm_addon.comparison.alignment import align
 from fmqm_addon.comparison.measurement import Measurement
 from fmqm_addon.metric.errors import FMQMError
 from fmqm_addon.metric.settings import Settings
+from tests.blender import scenes
+from tests.blender.script import noise, read_json, score, write_png, write_torus
 
-from . import scenes
 from .hostile_files import TETRAHEDRON, Outcome, all_files
-from .script import noise, read_json, score, write_png, write_torus
 
 FILES = all_files()
 TINY = Settings(samples=320, patches=5, color_units=10)
@@ -113,10 +114,10 @@ TOLD = {
 def outcome(path: Path | str) -> float | str:
     """The score of a file against itself, or the line that refuses it."""
     try:
-        reference = load_placed(str(path))
-        measurement = Measurement(reference.world(), TINY)
+        reference = load_asset(str(path))
+        measurement = Measurement(reference.world(), BVHQuery, TINY)
         measurement.prepare().run()
-        scores = measurement.compare(place(reference, load_placed(str(path))).mesh).run().scores
+        scores = measurement.compare(align(reference, load_asset(str(path))).mesh).run().scores
     except FMQMError as error:
         assert len(str(error).splitlines()) == 1
         assert Path(path).name in str(error)
@@ -144,10 +145,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def good_scores(folder: Path) -> list[float]:
-    reference = load_placed(str(folder / "good_1.obj"))
-    measurement = Measurement(reference.world(), TINY)
+    reference = load_asset(str(folder / "good_1.obj"))
+    measurement = Measurement(reference.world(), BVHQuery, TINY)
     measurement.prepare().run()
-    return list(measurement.compare(place(reference, load_placed(str(folder / "good_2.obj"))).mesh).run().scores)
+    return list(measurement.compare(align(reference, load_asset(str(folder / "good_2.obj"))).mesh).run().scores)
 
 
 @pytest.fixture(scope="module")
@@ -286,7 +287,7 @@ def test_names_of_files(tmp_path: Path, unharmed: None, name: str) -> None:
     assert outcome(path) == 1.0
     path.write_text("v 0 0 0\n")
     with pytest.raises(FMQMError) as caught:
-        load_placed(str(path))
+        load_asset(str(path))
     assert len(str(caught.value).splitlines()) == 1
 
 
@@ -336,7 +337,7 @@ def test_what_is_left_out_of_real_files_is_said(shared_data: Path) -> None:
     for name, wanted in REAL.items():
         path = shared_data / "hostile" / name
         if path.suffix in (".obj", ".ply") and wanted == 1.0:
-            told = " ".join(w for w in load_placed(str(path)).mesh.warnings if w.startswith(f"{path.name}: "))
+            told = " ".join(w for w in load_asset(str(path)).mesh.warnings if w.startswith(f"{path.name}: "))
             assert bool(told) == (name in TOLD) and TOLD.get(name, "") in told, f"{name}: {told}"
 
 

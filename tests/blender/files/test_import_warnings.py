@@ -11,14 +11,14 @@ import bpy
 import numpy as np
 import pytest
 
-from fmqm_addon.blender.files.load import load_placed
+from fmqm_addon.blender.files.load import load_asset
 from fmqm_addon.blender.materials.images import black_warnings, load_texture
 from fmqm_addon.blender.scene.mesh_arrays import AS_FOUND
 from fmqm_addon.metric.errors import MeshError
+from tests.blender import scenes
+from tests.blender.script import noise, write_png, write_torus
 
-from . import scenes
 from .hostile_files import TETRAHEDRON
-from .script import noise, write_png, write_torus
 
 RED = "newmtl red\nKd 1 0 0\n"
 WITH_COLORS = TETRAHEDRON.replace("v 0 0 0\n", "v 0 0 0 1 0 0\n")
@@ -27,7 +27,7 @@ WITH_COLORS = TETRAHEDRON.replace("v 0 0 0\n", "v 0 0 0 1 0 0\n")
 def told(path: Path) -> list[str]:
     """The warnings of the file itself, not of the objects in it."""
     start = f"{path.name}: "
-    return [each.removeprefix(start) for each in load_placed(str(path)).mesh.warnings if each.startswith(start)]
+    return [each.removeprefix(start) for each in load_asset(str(path)).mesh.warnings if each.startswith(start)]
 
 
 @pytest.mark.parametrize(
@@ -102,10 +102,10 @@ def test_missing_libraries(tmp_path: Path) -> None:
     (said,) = told(tmp_path / "True.blend")
     assert said.startswith("links ") and "Linked" in said and said.endswith(where)
     assert any(
-        "Skin is missing from its library" in each for each in load_placed(str(tmp_path / "True.blend")).mesh.warnings
+        "Skin is missing from its library" in each for each in load_asset(str(tmp_path / "True.blend")).mesh.warnings
     )
     with pytest.raises(MeshError, match="no mesh in it") as caught:
-        load_placed(str(tmp_path / "False.blend"))
+        load_asset(str(tmp_path / "False.blend"))
     assert where in str(caught.value)
 
 
@@ -131,7 +131,7 @@ def test_missing_parts_of_usd(tmp_path: Path, how: str) -> None:
     said = "refers to part.usda, which is missing or cannot be read"
     assert told(tmp_path / "whole.usda") == [said]
     with pytest.raises(MeshError, match=f"no mesh in it.*{said}"):
-        load_placed(str(tmp_path / "empty.usda"))
+        load_asset(str(tmp_path / "empty.usda"))
 
 
 def test_missing_image_of_usd(tmp_path: Path) -> None:
@@ -152,7 +152,7 @@ def test_missing_image_of_usd(tmp_path: Path) -> None:
 def test_the_namesake_counts_as_named(tmp_path: Path) -> None:
     (tmp_path / "shape.mtl").write_text(RED)
     (tmp_path / "shape.obj").write_text("usemtl red\n" + TETRAHEDRON)
-    mesh = load_placed(str(tmp_path / "shape.obj")).mesh
+    mesh = load_asset(str(tmp_path / "shape.obj")).mesh
     assert not mesh.warnings
     np.testing.assert_allclose(mesh.materials[0].color.lookup(np.zeros((1, 2))), [[1, 0, 0]], atol=1e-6)
 
@@ -175,7 +175,7 @@ def test_why_nothing_remains_of_a_file(tmp_path: Path) -> None:
     path = tmp_path / "shape.obj"
     path.write_text("v 0 0 0\nf 1 1 1\n")
     with pytest.raises(MeshError) as caught:
-        load_placed(str(path))
+        load_asset(str(path))
     said = "1 of 1 faces were left out by Blender's importer, as broken or repeated"
     assert str(caught.value) == f"{path}: the mesh has no faces; a surface is wanted ({said})"
 
@@ -241,10 +241,10 @@ def test_a_given_texture_makes_missing_materials_unimportant(tmp_path: Path) -> 
     (tmp_path / "ring.mtl").unlink()
     given = replace(AS_FOUND, texture=load_texture(str(write_png(tmp_path / "noise.png", noise()))))
     assert told(path) == ["names the material file ring.mtl, which is missing or cannot be read"]
-    assert not load_placed(str(path), given).mesh.warnings
+    assert not load_asset(str(path), given).mesh.warnings
 
 
 def test_names_of_many_lines_are_one_line_in_warnings(tmp_path: Path) -> None:
     path = tmp_path / "two\nlines.obj"
     path.write_text("mtllib gone.mtl\n" + TETRAHEDRON)
-    assert load_placed(str(path)).mesh.warnings[0].startswith("two\\nlines.obj: names the material file")
+    assert load_asset(str(path)).mesh.warnings[0].startswith("two\\nlines.obj: names the material file")

@@ -16,13 +16,13 @@ import pytest
 from fmqm_addon.blender.files import load as files
 from fmqm_addon.blender.files.load import SUFFIXES, load_mesh, split_spec
 from fmqm_addon.blender.materials.types import Reading
+from fmqm_addon.blender.scene.bvh import BVHQuery
 from fmqm_addon.comparison.measurement import Measurement
 from fmqm_addon.metric.errors import FileError, FMQMError, MeshError
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.surface import MeshArrays
 from fmqm_addon.metric.texture import Texture
-
-from . import scenes
+from tests.blender import scenes
 
 KINDS = tuple(scenes.EXPORTERS)
 PIXELS = scenes.noise()
@@ -77,7 +77,7 @@ def test_kinds_without_materials_warn(monkeys: Path, kind: str) -> None:
 
 
 def self_score(mesh: MeshArrays, again: MeshArrays) -> list[float]:
-    measurement = Measurement(mesh, TINY)
+    measurement = Measurement(mesh, BVHQuery, TINY)
     measurement.prepare().run()
     return list(measurement.compare(again).run().scores)
 

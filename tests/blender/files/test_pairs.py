@@ -16,6 +16,7 @@ from mathutils import Matrix
 from fmqm_addon.blender.files.load import load_mesh, open_file
 from fmqm_addon.blender.materials.images import load_texture
 from fmqm_addon.blender.materials.types import Reading
+from fmqm_addon.blender.scene.bvh import BVHQuery
 from fmqm_addon.blender.scene.members import scene_members
 from fmqm_addon.blender.scene.mesh_arrays import mesh_arrays
 from fmqm_addon.comparison.measurement import Comparison, Measurement
@@ -24,8 +25,7 @@ from fmqm_addon.metric.evaluation import COLUMNS
 from fmqm_addon.metric.perceived import PERCEIVED_COLUMNS
 from fmqm_addon.metric.settings import PRESETS, Settings
 from fmqm_addon.metric.surface import MeshArrays
-
-from . import scenes
+from tests.blender import scenes
 
 PAPER, FAST = (Settings(**PRESETS[name]) for name in ("paper", "fast"))
 MODELS = ("spot", "egyptian_cat", "bob", "low_poly_tree")
@@ -38,7 +38,7 @@ MOVED = 2e-3
 
 
 def prepared(reference: MeshArrays, settings: Settings, repeats: int = 1) -> Measurement:
-    measurement = Measurement(reference, settings, repeats)
+    measurement = Measurement(reference, BVHQuery, settings, repeats)
     measurement.prepare().run()
     return measurement
 

@@ -38,7 +38,7 @@ def test_steps_are_short_on_a_large_asset(
     monkeypatch.setattr(BVHQuery, "__init__", timed)
     runs: list[list[tuple[float, str]]] = []
     for _ in range(RUNS):
-        measurement = Measurement(mesh, Settings())
+        measurement = Measurement(mesh, BVHQuery, Settings())
         steps = []
         for stepper in (measurement.prepare(), measurement.compare(mesh)):
             more = True

@@ -17,12 +17,11 @@ import pytest
 
 from fmqm_addon.blender.access import ANYWHERE, Access
 from fmqm_addon.blender.files.libraries import library_names
-from fmqm_addon.blender.files.load import load_placed
+from fmqm_addon.blender.files.load import load_asset
 from fmqm_addon.blender.materials.types import Reading
 from fmqm_addon.metric.errors import FMQMError, ImageSizeError, MeshError
-
-from . import scenes
-from .script import SCORE, noise, score, write_png
+from tests.blender import scenes
+from tests.blender.script import SCORE, noise, score, write_png
 
 STRANGE = Reading(access=Access(confined=True))
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl M\nf 1/1 2/1 3/1\n"
@@ -35,7 +34,7 @@ USD_TRIANGLE = (
 def refusal(path: Path, reading: Reading = Reading()) -> str:  # noqa: B008 - frozen
     """The line with which a file is refused; "" where it is measured."""
     try:
-        load_placed(str(path), reading)
+        load_asset(str(path), reading)
     except FMQMError as error:
         assert len(str(error).splitlines()) == 1 and str(path) in str(error)
         return str(error)
@@ -287,7 +286,7 @@ def test_import_nodes_read_nothing(tmp_path: Path, kind: str, linked: bool) -> N
         object_.modifiers.new("N", "NODES").node_group = wanted.node_groups[0]
     save(path)
     os.mkfifo(far / "none")
-    found = load_placed(str(path))
+    found = load_asset(str(path))
     assert len(found.mesh.triangles) == 12
     told = [warning for warning in found.mesh.warnings if "are not evaluated" in warning]
     assert len(told) == 1 and "Import" in told[0]
@@ -359,7 +358,7 @@ def test_images_are_within_limits_whatever_shows_them(tmp_path: Path, way: str, 
     WAYS[way](huge_image(tmp_path, packed))
     path = save(tmp_path / "asset.blend")
     with pytest.raises(ImageSizeError, match="promises 40000 x 40000"):
-        load_placed(str(path))
+        load_asset(str(path))
     assert not [block for block in bpy.data.images if block.has_data]
 
 
@@ -382,7 +381,7 @@ def test_images_without_pixels_are_errors(tmp_path: Path, way: str) -> None:
     bpy.data.images[0].filepath = str(tmp_path / "broken.png")
     path = save(tmp_path / "asset.blend")
     with pytest.raises(MeshError, match="broken"):
-        load_placed(str(path))
+        load_asset(str(path))
 
 
 def test_one_tile_or_frame_is_enough(tmp_path: Path) -> None:
@@ -393,7 +392,7 @@ def test_one_tile_or_frame_is_enough(tmp_path: Path) -> None:
     WAYS["displace"](image)
     image.source = "SEQUENCE"
     with pytest.raises(ImageSizeError):
-        load_placed(str(save(tmp_path / "asset.blend")))
+        load_asset(str(save(tmp_path / "asset.blend")))
 
 
 def test_fonts_and_caches_of_blend_files(tmp_path: Path) -> None:
@@ -438,11 +437,11 @@ def test_no_number_where_there_is_no_memory(tmp_path: Path, way: str) -> None:
     code = (
         "import resource, sys; import bpy; from pathlib import Path\n"
         f"sys.path.insert(0, {str(SCORE.parents[1])!r})\n"
-        "from fmqm_addon.blender.files.load import load_placed\nfrom fmqm_addon.metric.errors import FMQMError\n"
+        "from fmqm_addon.blender.files.load import load_asset\nfrom fmqm_addon.metric.errors import FMQMError\n"
         "bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)\n"
         "pages = int(Path('/proc/self/statm').read_text().split()[0]) * 4096\n"
         "resource.setrlimit(resource.RLIMIT_AS, (pages + 200_000_000,) * 2)\n"
-        "try:\n    load_placed(sys.argv[1])\nexcept FMQMError as error:\n    print('REFUSED', error)\n"
+        "try:\n    load_asset(sys.argv[1])\nexcept FMQMError as error:\n    print('REFUSED', error)\n"
         "except MemoryError:\n    print('REFUSED')\nelse:\n    print('NUMBER')\n"
     )
     done = subprocess.run(

@@ -18,8 +18,7 @@ from fmqm_addon.blender.scene.bvh import BVHQuery
 from fmqm_addon.blender.scene.mesh_arrays import mesh_arrays
 from fmqm_addon.metric.colorspace import encode_srgb
 from fmqm_addon.metric.surface import Surface, prepare_surface
-
-from . import scenes
+from tests.blender import scenes
 
 SIDE = 32  # of the bakes
 TOLERANCE = 2 / 255

@@ -14,8 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fmqm_addon.blender.materials.image_headers import Header, file_header, read_header
-
-from . import scenes
+from tests.blender import scenes
 
 FORMATS = (
     "PNG",

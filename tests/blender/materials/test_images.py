@@ -10,26 +10,18 @@ import bpy
 import numpy as np
 import pytest
 
-from fmqm_addon.blender.materials.image_headers import Limits
-from fmqm_addon.blender.materials.images import (
-    TextureCache,
-    image_digest,
-    image_facts,
-    image_path,
-    load_texture,
-    read_pixels,
-    tile_path,
-    tile_place,
-)
+from fmqm_addon.blender.materials.image_files import image_digest, image_facts, image_path, tile_path, tile_place
+from fmqm_addon.blender.materials.image_headers import ImageLimits
+from fmqm_addon.blender.materials.images import TextureCache, load_texture, read_pixels
 from fmqm_addon.blender.materials.read_material import read_look
 from fmqm_addon.blender.materials.types import Reading
 from fmqm_addon.blender.scene.bvh import BVHQuery
 from fmqm_addon.blender.scene.mesh_arrays import mesh_arrays
 from fmqm_addon.metric.errors import FileError, ImageSizeError, MeshError
 from fmqm_addon.metric.surface import prepare_surface
+from tests.blender import scenes
 
-from . import scenes
-from .test_material import break_image, loaded
+from .test_read_material import break_image, loaded
 
 
 def test_top_row_of_the_file_is_at_v_near_1(tmp_path: Path) -> None:
@@ -143,7 +135,7 @@ def test_the_same_content_is_kept_once_for_all_assets(tmp_path: Path) -> None:
     path = scenes.write_png(tmp_path / "image.png", scenes.noise())
     copy = tmp_path / "copy.png"
     copy.write_bytes(path.read_bytes())
-    limits = Limits()
+    limits = ImageLimits()
     first = TextureCache().pixels(bpy.data.images.load(str(path)), limits)
     image = bpy.data.images.load(str(copy))
     second = TextureCache().pixels(image, limits)
@@ -152,7 +144,7 @@ def test_the_same_content_is_kept_once_for_all_assets(tmp_path: Path) -> None:
     linear = TextureCache().pixels(image, limits)
     assert linear is not None and linear.linear and not second.linear
     with pytest.raises(MeshError):
-        TextureCache().pixels(bpy.data.images.load(str(path)), Limits(side=8))
+        TextureCache().pixels(bpy.data.images.load(str(path)), ImageLimits(side=8))
     del first, second, linear
     copy.write_bytes(scenes.write_png(path, scenes.noise(seed=1)).read_bytes())
     image.reload()
@@ -176,22 +168,25 @@ def test_huge_images_are_refused_before_they_are_decoded(tmp_path: Path) -> None
     path = scenes.write_png(tmp_path / "wide.png", np.zeros((2, 40, 3), np.uint8))
     material = scenes.textured(path)
     image = material.node_tree.nodes["Image Texture"].image
-    for limits, word in ((Limits(side=39), "the 39 a side"), (Limits(decoded=319), "the 319 that are allowed")):
+    for limits, word in (
+        (ImageLimits(side=39), "the 39 a side"),
+        (ImageLimits(decoded=319), "the 319 that are allowed"),
+    ):
         with pytest.raises(ImageSizeError) as caught:
             read_look(material, TextureCache(), Reading(limits=limits))
         text = str(caught.value)
         assert str(path) in text and "40 x 2" in text and word in text and not image.has_data
-    assert read_pixels(image, Limits(side=40, decoded=320)) is not None
+    assert read_pixels(image, ImageLimits(side=40, decoded=320)) is not None
     with pytest.raises(MeshError, match="wide.png"):
-        load_texture(str(path), Limits(side=39))
+        load_texture(str(path), ImageLimits(side=39))
     image.pack()
     with pytest.raises(MeshError, match="40 x 2"):
-        read_pixels(image, Limits(side=39))
+        read_pixels(image, ImageLimits(side=39))
     with pytest.raises(MeshError, match="generated.*40 x 2"):
-        read_pixels(bpy.data.images.new("generated", 40, 2), Limits(side=39))
+        read_pixels(bpy.data.images.new("generated", 40, 2), ImageLimits(side=39))
     deep = loaded(tmp_path, np.zeros((2, 40, 3), np.uint16), "deep.png")
     with pytest.raises(MeshError, match="1280 bytes"):
-        read_pixels(deep, Limits(decoded=1279))
+        read_pixels(deep, ImageLimits(decoded=1279))
 
 
 def test_a_header_that_lies_is_refused(tmp_path: Path) -> None:

@@ -11,12 +11,11 @@ import pytest
 
 from fmqm_addon.blender.materials.images import TextureCache
 from fmqm_addon.blender.materials.read_material import plain_look, read_look
-from fmqm_addon.blender.materials.types import Layer, Look, Reading, Unread
+from fmqm_addon.blender.materials.types import Look, MeshLayer, Reading, Unread
 from fmqm_addon.blender.scene.mesh_arrays import mesh_arrays
 from fmqm_addon.metric.errors import MeshError
 from fmqm_addon.metric.texture import PlainColor, Texture
-
-from . import scenes
+from tests.blender import scenes
 
 # Linear light and its sRGB encoding, by hand from IEC 61966-2-1.
 ENCODED = {0.0: 0.0, 0.002: 0.02584, 0.0031308: 0.04045, 0.18: 0.461356, 0.5: 0.735357, 1.0: 1.0}
@@ -54,7 +53,7 @@ def test_image_that_feeds_base_color(tmp_path: Path) -> None:
     assert isinstance(seen.material.color, Texture) and not seen.warnings and seen.material.alpha is None
     assert (seen.material.name, seen.material.how, seen.material.uv) == ("Painted", "read", 0)
     assert seen.material.color.pixels.dtype == np.uint8 and np.array_equal(seen.material.color.pixels, pixels)
-    assert seen.layers == (Layer("uv", ""),)
+    assert seen.layers == (MeshLayer("uv", ""),)
 
 
 def test_texture_of_another_socket_is_not_taken_but_told(tmp_path: Path) -> None:
@@ -401,7 +400,7 @@ def test_through_reroutes(tmp_path: Path) -> None:
             start = reroute.outputs[0]
         tree.links.new(start, end)
     seen = look(material)
-    assert np.array_equal(seen.material.color.pixels, pixels) and seen.layers == (Layer("uv", "Second"),)
+    assert np.array_equal(seen.material.color.pixels, pixels) and seen.layers == (MeshLayer("uv", "Second"),)
 
 
 def break_image(path: Path, how: str) -> None:

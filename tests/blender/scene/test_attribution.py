@@ -15,19 +15,19 @@ import pytest
 import fmqm_addon
 from fmqm_addon import api
 from fmqm_addon.blender.files.load import load_mesh
+from fmqm_addon.blender.scene.bvh import BVHQuery
 from fmqm_addon.blender.scene.measure import measuring
 from fmqm_addon.blender.scene.target import target_of
 from fmqm_addon.comparison.attribution import Attribution, attribute
 from fmqm_addon.comparison.measurement import Measurement
-from fmqm_addon.comparison.pair import Question
+from fmqm_addon.comparison.pair import PairOptions
 from fmqm_addon.metric.settings import PRESETS, Settings
 from fmqm_addon.metric.surface import MeshArrays
 from fmqm_addon.metric.texture import Material, PlainColor
 from fmqm_addon.ui import inputs, panels
 from fmqm_addon.ui.properties import row_attribution
-
-from . import scenes
-from .script import noise, read_json, score, strict_json, write_png, write_torus
+from tests.blender import scenes
+from tests.blender.script import noise, read_json, score, strict_json, write_png, write_torus
 
 SMALL = Settings(samples=6400, patches=40, color_units=20)
 
@@ -48,7 +48,7 @@ def torus(tmp_path_factory: pytest.TempPathFactory) -> dict[str, MeshArrays]:
 
 
 def attributed(reference: MeshArrays, distorted: MeshArrays, settings: Settings = SMALL) -> Attribution:
-    measurement = Measurement(reference, settings)
+    measurement = Measurement(reference, BVHQuery, settings)
     measurement.prepare().run()
     return attribute(measurement, reference, distorted, measurement.compare(distorted).run()).run()
 
@@ -213,7 +213,7 @@ def said() -> list[str]:
 def test_attribution_from_python_and_its_progress(monkeys: list[bpy.types.Object]) -> None:
     """Its progress is a part of its object's; it changes no score."""
     plain = api.measure(*monkeys, SMALL, both=True)[0]
-    stepper = measuring(target_of(monkeys[0]), [target_of(monkeys[1])], Question(SMALL, both=True, attribution=True))
+    stepper = measuring(target_of(monkeys[0]), [target_of(monkeys[1])], PairOptions(SMALL, both=True, attribution=True))
     seen = [("", 0.0)]
     while stepper.step():
         seen.append((stepper.progress.stage, stepper.progress.done))

@@ -10,8 +10,7 @@ from fmqm_addon.blender.scene.bvh import BVHQuery
 from fmqm_addon.metric.fields import count_crossings
 from fmqm_addon.metric.geometry import closest_on_triangles
 from fmqm_addon.metric.surface import MeshArrays, prepare_surface
-
-from . import scenes
+from tests.blender import scenes
 
 N = 200
 FLOAT32 = 1e-6  # what a tree of float32 in a box of diagonal 1 can tell apart

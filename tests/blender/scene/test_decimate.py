@@ -24,27 +24,24 @@ from fmqm_addon.blender.files.export import (
     written_reader,
 )
 from fmqm_addon.blender.files.load import load_mesh
-from fmqm_addon.blender.scene.decimate import (
-    DECIMATE,
+from fmqm_addon.blender.scene.bvh import BVHQuery
+from fmqm_addon.blender.scene.decimate import DECIMATE, WELD, add_modifiers, scene_reader
+from fmqm_addon.comparison.decimation import (
     LEAST_TRIANGLES,
     TOLERANCE,
-    WELD,
+    DecimationGoal,
     Search,
     Version,
-    Wish,
-    add_modifiers,
+    decimating,
     last_passing,
-    reducing,
-    scene_reader,
 )
 from fmqm_addon.metric.errors import FMQMError, MeshError, SettingsError
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.stepper import Progress
 from fmqm_addon.metric.surface import MeshArrays, finish
 from fmqm_addon.ui import decimate as ui_decimate
-
-from . import scenes
-from .script import SCORE, noise, read_json, score, strict_json, write_png, write_torus
+from tests.blender import scenes
+from tests.blender.script import SCORE, noise, read_json, score, strict_json, write_png, write_torus
 
 DECIMATE_SCRIPT = SCORE.with_name("decimate.py")
 TINY = Settings(samples=6400, patches=50, color_units=20)  # above 40 patches: searched quickly, then confirmed
@@ -83,16 +80,16 @@ def test_the_last_that_passes_is_found_from_anywhere(passing: int, start: int, s
 
 def test_the_found_version_passes_and_the_next_cheaper_one_does_not() -> None:
     monkey = scenes.monkey()
-    reduced = reducing(scene_reader([monkey.name], "it"), Wish((0.9, 0.8)), TINY).run()
-    for target, outcome in zip((0.9, 0.8), reduced.outcomes, strict=True):
+    result = decimating(scene_reader([monkey.name], "it"), BVHQuery, DecimationGoal((0.9, 0.8)), TINY).run()
+    for target, outcome in zip((0.9, 0.8), result.results, strict=True):
         found = outcome.last
         assert found.reached and found.best.fmqm >= target > found.below.fmqm
         assert not found.best.quick and not found.below.quick, "confirmed with all patches"
         assert found.below.triangles >= found.best.triangles * (1 - TOLERANCE) - 2, "the next one"
         assert any(step.quick for step in found.path), "searched with few patches"
-    first = reduced.outcomes[0].last
+    first = result.results[0].last
     assert {first.best, first.below} <= set(first.path), "the path tells all"
-    assert reduced.outcomes[1].last.best.triangles < reduced.outcomes[0].last.best.triangles < reduced.triangles == 968
+    assert result.results[1].last.best.triangles < result.results[0].last.best.triangles < result.triangles == 968
 
 
 def test_what_the_file_holds_decides() -> None:
@@ -103,8 +100,8 @@ def test_what_the_file_holds_decides() -> None:
     def written(version: Version) -> MeshArrays:
         return read(replace(version, ratio=0.9 * version.ratio))
 
-    alone = reducing(read, Wish((0.9,)), whole).run().outcomes[0].last
-    found = reducing(read, Wish((0.9,)), whole, written).run().outcomes[0].last
+    alone = decimating(read, BVHQuery, DecimationGoal((0.9,)), whole).run().results[0].last
+    found = decimating(read, BVHQuery, DecimationGoal((0.9,)), whole, written).run().results[0].last
     assert found.reached and found.best.fmqm >= 0.9 > found.below.fmqm
     assert found.best.version.ratio > alone.best.version.ratio, "gone up again"
     assert found.best.triangles == len(written(found.best.version).triangles)
@@ -112,7 +109,7 @@ def test_what_the_file_holds_decides() -> None:
 
 def test_ratio_1_is_the_object_itself() -> None:
     monkey = scenes.monkey()
-    search = Search(scene_reader([monkey.name], "it"), TINY)
+    search = Search(scene_reader([monkey.name], "it"), BVHQuery, TINY)
     finish(search.prepare())
     found = finish(search.find(1.0, search.ratios()[:1]))
     assert found.reached and found.best.fmqm == 1.0 and found.best.triangles == 968
@@ -120,10 +117,15 @@ def test_ratio_1_is_the_object_itself() -> None:
 
 def test_a_target_that_the_most_triangles_allowed_miss() -> None:
     monkey = scenes.monkey()
-    found = reducing(scene_reader([monkey.name], "it"), Wish((0.99,), max_triangles=100), TINY).run().outcomes[0].last
+    found = (
+        decimating(scene_reader([monkey.name], "it"), BVHQuery, DecimationGoal((0.99,), max_triangles=100), TINY)
+        .run()
+        .results[0]
+        .last
+    )
     assert not found.reached and found.best.triangles <= 100 and found.below is None
     with pytest.raises(SettingsError, match="max-triangles is 3; at least 4 are wanted"):
-        Wish((0.99,), max_triangles=LEAST_TRIANGLES - 1)
+        DecimationGoal((0.99,), max_triangles=LEAST_TRIANGLES - 1)
 
 
 def test_what_cannot_be_decimated_counts_toward_the_most_triangles() -> None:
@@ -134,24 +136,24 @@ def test_what_cannot_be_decimated_counts_toward_the_most_triangles() -> None:
     names = [monkey.name, curve.name]
     whole = len(scene_reader(names, "it")(Version()).triangles)
     fixed = whole - 968
-    reduced = reducing(scene_reader(names, "it"), Wish((0.01, 0.9999), fixed + 100), TINY).run()
-    for found in (outcome.last for outcome in reduced.outcomes):
+    result = decimating(scene_reader(names, "it"), BVHQuery, DecimationGoal((0.01, 0.9999), fixed + 100), TINY).run()
+    for found in (outcome.last for outcome in result.results):
         assert all(step.triangles <= fixed + 100 for step in found.path)
         assert found.best.triangles >= fixed
-    assert not reduced.outcomes[1].last.reached and reduced.outcomes[1].last.best.triangles > fixed + 80, "the dearest"
+    assert not result.results[1].last.reached and result.results[1].last.best.triangles > fixed + 80, "the dearest"
     with pytest.raises(MeshError, match=f"it cannot be decimated to {fixed - 1} triangles; allow more"):
-        reducing(scene_reader(names, "it"), Wish((0.5,), fixed - 1), TINY).run()
+        decimating(scene_reader(names, "it"), BVHQuery, DecimationGoal((0.5,), fixed - 1), TINY).run()
 
 
 def test_searching_leaves_nothing_behind_even_when_it_is_cancelled_or_fails() -> None:
     monkey = scenes.monkey()
     before = scenes.blocks()
-    stepper = reducing(scene_reader([monkey.name], "it"), Wish((0.9,)), TINY)
+    stepper = decimating(scene_reader([monkey.name], "it"), BVHQuery, DecimationGoal((0.9,)), TINY)
     while stepper.step() and stepper.progress.done < 0.5:
         pass
     stepper.cancel()
     assert scenes.blocks() == before and not monkey.modifiers
-    stepper = reducing(scene_reader([monkey.name], "it"), Wish((0.9,)), TINY)
+    stepper = decimating(scene_reader([monkey.name], "it"), BVHQuery, DecimationGoal((0.9,)), TINY)
     stepper.step()
     stepper.step()
     bpy.data.objects.remove(monkey)

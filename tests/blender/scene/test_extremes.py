@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fmqm_addon.blender.scene.target import placed
-from fmqm_addon.comparison.alignment import place
+from fmqm_addon.blender.scene.bvh import BVHQuery
+from fmqm_addon.blender.scene.target import asset_mesh
+from fmqm_addon.comparison.alignment import align
 from fmqm_addon.comparison.measurement import Measurement
 from fmqm_addon.metric.errors import MeshError
 from fmqm_addon.metric.settings import Settings
-
-from . import scenes
+from tests.blender import scenes
 
 SMALL = Settings(samples=1600, patches=20, color_units=20)
 Shape = tuple[NDArray[np.float64], NDArray[np.int64]]
@@ -76,10 +76,10 @@ def coincident(extra: bool) -> Shape:
 def self_scores(object_: bpy.types.Object, settings: Settings = SMALL) -> list[float]:
     before = scenes.blocks()
     try:
-        reference = placed([object_], "extreme")
-        measurement = Measurement(reference.world(), settings)
+        reference = asset_mesh([object_], "extreme")
+        measurement = Measurement(reference.world(), BVHQuery, settings)
         measurement.prepare().run()
-        return list(measurement.compare(place(reference, placed([object_], "extreme")).mesh).run().scores)
+        return list(measurement.compare(align(reference, asset_mesh([object_], "extreme")).mesh).run().scores)
     finally:
         assert scenes.blocks() == before
 

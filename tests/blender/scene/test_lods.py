@@ -7,8 +7,7 @@ import bpy
 import pytest
 
 from fmqm_addon.blender.scene.lods import find_lods, lod_of_name
-
-from . import scenes
+from tests.blender import scenes
 
 
 @pytest.mark.parametrize(

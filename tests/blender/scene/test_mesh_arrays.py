@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from fmqm_addon.blender.files.flatten import make_plain
+from fmqm_addon.blender.files.flatten import flatten_objects
 from fmqm_addon.blender.materials.images import TextureCache
 from fmqm_addon.blender.materials.types import Reading
 from fmqm_addon.blender.scene.bvh import BVHQuery
@@ -20,8 +20,7 @@ from fmqm_addon.blender.scene.mesh_arrays import mesh_arrays, to_bake
 from fmqm_addon.metric.errors import MeshError
 from fmqm_addon.metric.surface import prepare_surface
 from fmqm_addon.metric.texture import Texture
-
-from . import scenes
+from tests.blender import scenes
 
 GIVEN = Reading(texture=Texture(scenes.noise()))
 
@@ -156,7 +155,7 @@ def test_slot_that_is_linked_to_the_object_and_empty_there() -> None:
     is_old = bpy.app.version < (5, 2)
     arrays = mesh_arrays([object_], "asset")
     assert arrays.materials[0].how == ("read" if is_old else "none") and bool(arrays.warnings) != is_old
-    make_plain([object_], alone=True)
+    flatten_objects([object_], alone=True)
     (plain,) = bpy.data.objects
     assert [slot.material and slot.material.name for slot in plain.material_slots] == ["Data" if is_old else None]
 

@@ -16,23 +16,23 @@ from hypothesis import strategies as st
 from mathutils import Euler, Matrix, Vector
 
 from fmqm_addon.blender.baking import bake
-from fmqm_addon.blender.files.load import load_mesh, load_placed
+from fmqm_addon.blender.files.load import load_asset, load_mesh
 from fmqm_addon.blender.materials.types import Reading
 from fmqm_addon.blender.scene import mesh_arrays as mesh_module
+from fmqm_addon.blender.scene.bvh import BVHQuery
 from fmqm_addon.blender.scene.evaluated import evaluated
 from fmqm_addon.blender.scene.measure import measuring
 from fmqm_addon.blender.scene.members import check_object, metaball_mother, scene_members
 from fmqm_addon.blender.scene.mesh_arrays import mesh_arrays
 from fmqm_addon.blender.scene.target import fingerprint, take, target_of
-from fmqm_addon.comparison.alignment import place
+from fmqm_addon.comparison.alignment import align
 from fmqm_addon.comparison.measurement import Measurement
-from fmqm_addon.comparison.pair import Question
+from fmqm_addon.comparison.pair import PairOptions
 from fmqm_addon.metric.colorspace import decode_srgb
 from fmqm_addon.metric.errors import MeshError
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.surface import MeshArrays
-
-from . import scenes
+from tests.blender import scenes
 
 
 def linked(object_: bpy.types.Object, collection: bpy.types.Collection | None = None) -> bpy.types.Object:
@@ -180,7 +180,9 @@ def test_inputs_of_geometry_nodes_are_noticed() -> None:
 @pytest.mark.parametrize("make", KINDS, ids=lambda make: make.__name__)
 def test_kinds_score_1_against_themselves(make: Callable[[], bpy.types.Object]) -> None:
     object_ = make()
-    (outcome,) = measuring(target_of(object_), [target_of(object_)], Question(Settings(samples=800, patches=8))).run()
+    (outcome,) = measuring(
+        target_of(object_), [target_of(object_)], PairOptions(Settings(samples=800, patches=8))
+    ).run()
     assert outcome.error is None and list(outcome.scores) == [1.0] * 5
 
 
@@ -425,15 +427,15 @@ def test_a_gltf_of_35_parts_is_one_asset(tmp_path: Path) -> None:
     with bpy.context.temp_override(active_object=made[0], object=made[0], selected_editable_objects=made):
         bpy.ops.object.join()
     joined = scenes.export(tmp_path, "blend", "joined")
-    asset = load_placed(str(glb))
+    asset = load_asset(str(glb))
     assert len(asset.mesh.triangles) == corners
     assert sorted(look.name for look in asset.mesh.materials) == ["Blue", "Grey", "Red"]
-    measurement = Measurement(asset.world(), Settings(samples=4000, patches=20))
+    measurement = Measurement(asset.world(), BVHQuery, Settings(samples=4000, patches=20))
     measurement.prepare().run()
     assert list(measurement.compare(asset.world()).run().scores) == [1.0] * 5
-    placement = place(asset, load_placed(str(joined)))
-    assert placement.place == "world"
-    np.testing.assert_allclose(measurement.compare(placement.mesh).run().scores, 1, atol=1e-3)
+    alignment = align(asset, load_asset(str(joined)))
+    assert alignment.space == "world"
+    np.testing.assert_allclose(measurement.compare(alignment.mesh).run().scores, 1, atol=1e-3)
 
 
 # Hidden from rendering
@@ -571,13 +573,13 @@ def test_kinds_of_files_whose_axes_differ(tmp_path: Path) -> None:
         write(str(tmp_path / f"monkey.{kind}"))
     turns = {}
     for kind in UP:
-        reference = load_placed(str(tmp_path / f"monkey.{kind}"))
-        measurement = Measurement(reference.world(), Settings(samples=4000, patches=40))
+        reference = load_asset(str(tmp_path / f"monkey.{kind}"))
+        measurement = Measurement(reference.world(), BVHQuery, Settings(samples=4000, patches=40))
         measurement.prepare().run()
         for other in UP:
-            placement = place(reference, load_placed(str(tmp_path / f"monkey.{other}")))
-            assert measurement.compare(placement.mesh).run().scores[0] >= 0.999, (kind, other)
-            turns[kind, other] = placement.turn
+            alignment = align(reference, load_asset(str(tmp_path / f"monkey.{other}")))
+            assert measurement.compare(alignment.mesh).run().scores[0] >= 0.999, (kind, other)
+            turns[kind, other] = alignment.turn
     assert turns["glb", "ply"] == 90 and turns["stl", "glb"] == -90
     assert turns["ply", "stl"] == turns["obj", "glb"] == 0
 
@@ -746,7 +748,7 @@ def test_the_panel_says_that_it_bakes() -> None:
     next(node for node in tree.nodes if node.type == "SET_MATERIAL").inputs["Material"].default_value = procedural()
     few = Settings(samples=400, patches=4)
     compared = [target_of(instances), target_of(plain), target_of(nodes)]
-    stepper = measuring(target_of(stone), compared, Question(few, reading=Reading(bake=32)))
+    stepper = measuring(target_of(stone), compared, PairOptions(few), Reading(bake=32))
     stages = []
     while stepper.step():
         stages.append(stepper.progress.stage)

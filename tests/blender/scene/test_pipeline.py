@@ -12,13 +12,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mathutils import Matrix
 
-from fmqm_addon.blender.scene.target import placed
-from fmqm_addon.comparison.alignment import SPACES, place
+from fmqm_addon.blender.scene.bvh import BVHQuery
+from fmqm_addon.blender.scene.target import asset_mesh
+from fmqm_addon.comparison.alignment import SPACES, align
 from fmqm_addon.comparison.measurement import Measurement
 from fmqm_addon.metric.errors import FMQMError
 from fmqm_addon.metric.settings import Settings
-
-from . import scenes
+from tests.blender import scenes
 
 TINY = Settings(samples=320, patches=5, color_units=10)
 COORDINATES = st.sampled_from([0.0, 0.0, 1.0, -1.0, 0.5, 1e-7, 1e6, np.nan, np.inf]) | st.floats(-2, 2, width=32)
@@ -104,12 +104,12 @@ def test_anything_is_measured_or_refused(
     one, other = add_object(first, image), add_object(second, image)
     before = scenes.blocks()
     try:
-        reference = placed([one], "first")
-        measurement = Measurement(reference.world(), TINY)
+        reference = asset_mesh([one], "first")
+        measurement = Measurement(reference.world(), BVHQuery, TINY)
         measurement.prepare().run()
-        itself = place(reference, placed([one], "first"), space, match_scale)
+        itself = align(reference, asset_mesh([one], "first"), space, match_scale)
         assert list(measurement.compare(itself.mesh).run().scores) == [1.0] * 5
-        compared = place(reference, placed([other], "second"), space, match_scale)
+        compared = align(reference, asset_mesh([other], "second"), space, match_scale)
         scores = measurement.compare(compared.mesh).run().scores
         assert len(scores) == 5 and all(0 <= score <= 1 for score in scores)
     except FMQMError as error:

@@ -16,8 +16,9 @@ import pytest
 import fmqm_addon
 from fmqm_addon import api
 from fmqm_addon.blender.files.load import load_mesh
+from fmqm_addon.blender.scene.bvh import BVHQuery
 from fmqm_addon.comparison.measurement import Measurement
-from fmqm_addon.comparison.trust import Fact
+from fmqm_addon.comparison.surface_facts import Fact
 from fmqm_addon.metric.evaluation import COLUMNS
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.surface import MeshArrays
@@ -25,8 +26,7 @@ from fmqm_addon.report.trust_table import trust_dict
 from fmqm_addon.ui import panels
 from fmqm_addon.ui.properties import row_reverse, row_trust
 from fmqm_addon.ui.results import pair_of
-
-from . import scenes
+from tests.blender import scenes
 
 QUICK = Settings(samples=20_000, scored_patches=100)
 
@@ -37,7 +37,7 @@ def values(facts: tuple[Fact, ...]) -> dict[str, object]:
 
 def compared(reference: MeshArrays, *distorted: MeshArrays) -> Iterator[tuple[dict[str, object], ...]]:
     """Facts of the reference, the distorted, the pair."""
-    measurement = Measurement(reference, QUICK)
+    measurement = Measurement(reference, BVHQuery, QUICK)
     measurement.prepare().run()
     for mesh in distorted:
         trust = measurement.compare(mesh).run().trust

@@ -12,10 +12,9 @@ import pytest
 from fmqm_addon.blender.materials.types import Reading
 from fmqm_addon.blender.scene.measure import measuring
 from fmqm_addon.blender.scene.target import target_of
-from fmqm_addon.comparison.pair import Question
+from fmqm_addon.comparison.pair import PairOptions
 from fmqm_addon.metric.settings import Settings
-
-from . import scenes
+from tests.blender import scenes
 
 
 def state() -> dict[str, object]:
@@ -75,11 +74,11 @@ def test_nothing_of_the_scene_changes(mode: str, painting: bool, tmp_path: Path)
     assert image.is_dirty == painting
     compared = [target_of(hidden), target_of(shelf), target_of(crate, bare=True)]
     few = Settings(samples=400, patches=4)
-    outcomes = measuring(target_of(crate), compared, Question(few, reading=Reading(bake=32))).run()
+    outcomes = measuring(target_of(crate), compared, PairOptions(few), Reading(bake=32)).run()
     assert all(outcome.error is None for outcome in outcomes)
     # What the baker of 4.5 would lose, it must not be given.
     baked = not painting or bpy.app.version >= (5, 2)
-    hows = {look.name: look.how for look in outcomes[0].answer.reference.materials}
+    hows = {look.name: look.how for look in outcomes[0].pair_result.reference.materials}
     assert hows == {"Painted": "read", "Rust": "baked" if baked else "plain"}
     lost = "image a.png has unsaved changes, which baking would lose; save or pack it first; its plain color is taken"
     assert any(lost in warning for outcome in outcomes for warning in outcome.warnings) != baked
