@@ -15,6 +15,13 @@ from ...metric.geometry import Floats
 from ...metric.texture import PlainColor, Texture, Tiles
 
 BRIGHTEST = 1e6  # linear light is kept within this, so that nothing made of it overflows
+LUMINANCE = (0.2126729, 0.7151522, 0.0721750)  # a color where a number is wanted
+AVERAGE = (1 / 3, 1 / 3, 1 / 3)  # a vector where a number is wanted
+CHANNELS = {"Red": (1.0, 0.0, 0.0), "Green": (0.0, 1.0, 0.0), "Blue": (0.0, 0.0, 1.0)} | {
+    "X": (1.0, 0.0, 0.0),
+    "Y": (0.0, 1.0, 0.0),
+    "Z": (0.0, 0.0, 1.0),
+}
 
 
 class Light(Protocol):

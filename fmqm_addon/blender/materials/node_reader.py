@@ -24,6 +24,9 @@ from ...metric.texture import (
 )
 from .cycles_alpha import merged, used_alphas
 from .expressions import (
+    AVERAGE,
+    CHANNELS,
+    LUMINANCE,
     OPERATIONS,
     Constant,
     Encoded,
@@ -67,13 +70,6 @@ _INTERPOLATIONS: dict[str, Interpolation] = {
     "Closest": "closest",
     "Cubic": "cubic",
     "Smart": "cubic",  # to Cycles they are the same
-}
-_LUMINANCE = (0.2126729, 0.7151522, 0.0721750)  # a color where a number is wanted
-_AVERAGE = (1 / 3, 1 / 3, 1 / 3)  # a vector where a number is wanted
-_CHANNELS = {"Red": (1.0, 0.0, 0.0), "Green": (0.0, 1.0, 0.0), "Blue": (0.0, 0.0, 1.0)} | {
-    "X": (1.0, 0.0, 0.0),
-    "Y": (0.0, 1.0, 0.0),
-    "Z": (0.0, 0.0, 1.0),
 }
 FIRST_ROLES = ("base color", "alpha")  # of the images, before all others
 
@@ -289,7 +285,7 @@ class MaterialReader:
         self.count(place)
         node, socket = place.node, place.socket
         if family(socket) != "VALUE":
-            return weighted(self._light(place), _AVERAGE if socket.type == "VECTOR" else _LUMINANCE)
+            return weighted(self._light(place), AVERAGE if socket.type == "VECTOR" else LUMINANCE)
         if not socket.is_output or node.type == "VALUE":
             return Constant(finite(float(socket.default_value)))
         if node.type == "TEX_IMAGE":
@@ -300,7 +296,7 @@ class MaterialReader:
         if node.type == "LIGHT_PATH" and socket.name.startswith("Is "):
             return Constant(float(socket.name == "Is Camera Ray"))  # the eye's
         if node.type == "SEPXYZ" or (node.type == "SEPARATE_COLOR" and node.mode == "RGB"):
-            return weighted(self._light(place.input(0)), _CHANNELS[socket.identifier])
+            return weighted(self._light(place.input(0)), CHANNELS[socket.identifier])
         if node.type == "MATH" and node.operation in OPERATIONS:
             first = self._value(place.input(0))
             second = Constant(0.0) if node.operation == "ROUND" else self._value(place.input(1))
