@@ -16,8 +16,7 @@ from fmqm_addon.blender.files.load import load_asset
 from fmqm_addon.blender.files.preflight_file import check_file
 from fmqm_addon.blender.scene import mesh_arrays
 from fmqm_addon.metric.errors import FileError, MeshError
-
-from . import scenes
+from tests.blender import scenes
 
 LIMIT = 10_000_000
 
