@@ -18,8 +18,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from fmqm_addon.cli.stops import stops_wait
-
+from fmqm_addon.batch.interrupt import stops_wait
 from fmqm_addon.batch.progress_log import Log
 from fmqm_addon.batch.scorer import REMEDIES
 from fmqm_addon.blender.access import Access

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, TextIO
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from fmqm_addon.batch.cluster import WAIT, score_on_cluster
+from fmqm_addon.batch.interrupt import stops_wait
 from fmqm_addon.batch.journal import Journal, Records, row_key
 from fmqm_addon.batch.manifest import glob_files, lod_rows, plain_rows, read_manifest
 from fmqm_addon.batch.merge import Merged
