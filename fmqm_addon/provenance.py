@@ -7,7 +7,7 @@ import functools
 import hashlib
 from pathlib import Path
 
-from . import VERSION
+from .version import VERSION
 
 PARTS = ("metric", "comparison", "blender")  # folders of the package whose code decides scores
 
