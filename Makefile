@@ -12,7 +12,10 @@ RUN = $(VENV)/bin/python
 # Blender's own tool for extensions, which needs no Blender.
 EXTENSION_TOOL = $(RUN) $(VENV)/lib/python*/site-packages/bpy/*/scripts/addons_core/bl_pkg/cli/blender_ext.py
 
-.PHONY: demo pictures extension test test-all stress bench lint clean
+# By the hashes of their files: what an index or a mirror serves otherwise is not installed.
+INSTALL = $(RUN) -m pip install --quiet --disable-pip-version-check --require-hashes
+
+.PHONY: demo pictures extension test test-all stress bench lint lock clean
 
 demo: $(VENV)/runs
 	$(RUN) scripts/demo.py --out out/demo
@@ -55,12 +58,20 @@ $(VENV)/runs: requirements.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] not in ((3, 11), (3, 13)))' || \
 	  { echo "Python $(VERSION) has no bpy; make PYTHON=... with a Python 3.11 or 3.13 (with venv)"; exit 1; }
 	test -x $(RUN) || $(PYTHON) -m venv $(VENV)
-	$(RUN) -m pip install --quiet --disable-pip-version-check -r requirements.txt
+	$(INSTALL) -r requirements.txt
 	@touch $@
 
-$(VENV)/tests: requirements-dev.txt requirements-cluster.txt $(VENV)/runs
-	$(RUN) -m pip install --quiet --disable-pip-version-check -r requirements-dev.txt
+$(VENV)/tests: requirements-dev.txt $(VENV)/runs
+	$(INSTALL) -r requirements-dev.txt
 	@touch $@
+
+# requirements*.txt anew from requirements*.in, for both Pythons and every system; needs uv. The largest comes first and
+# binds the others, so that all three agree. ARGS=--upgrade takes newer versions of what the .in files do not pin.
+LOCK = uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --no-annotate
+lock:
+	$(LOCK) $(ARGS) requirements-dev.in -o requirements-dev.txt
+	$(LOCK) -c requirements-dev.txt requirements-cluster.in -o requirements-cluster.txt
+	$(LOCK) -c requirements-dev.txt requirements.in -o requirements.txt
 
 clean:
 	rm -rf .venv out dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """FMQM for Blender: does this LOD still look like the original?"""
 
-VERSION = "0.1.0"
+from .version import VERSION
+
+__all__ = ["VERSION", "register", "unregister"]
 
 
 def register() -> None:

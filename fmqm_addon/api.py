@@ -17,7 +17,7 @@ import bpy
 from .blender.materials.types import Reading
 from .blender.scene.measure import Outcome, measuring
 from .blender.scene.target import target_of
-from .comparison.pair import Question
+from .comparison.pair import PairOptions
 from .metric.evaluation import COLUMNS, Result, Scores
 from .metric.settings import PRESETS, Settings
 
@@ -67,6 +67,7 @@ def measure(
     for asset in (reference, *assets):
         if not isinstance(asset, _ASSETS) or asset.is_embedded_data:
             raise TypeError(f"{asset!r} is given; an object or a collection, not the scene's own, is wanted")
-    asked = Question(settings or Settings(), repeats, space, match_scale, both, attribution, Reading(bake=bake))
+    options = PairOptions(settings or Settings(), repeats, space, match_scale, both, attribution)
     reference_target = target_of(reference, bare=reference_without_modifiers)
-    return measuring(reference_target, [target_of(asset) for asset in assets], asked).run()
+    targets = [target_of(asset) for asset in assets]
+    return measuring(reference_target, targets, options, Reading(bake=bake)).run()

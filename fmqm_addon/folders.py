@@ -25,6 +25,7 @@ if sys.platform == "win32":
 else:
     import fcntl
 
+TEMPORARY_PLACES = ("TMPDIR", "TEMP", "TMP")  # of them Python and Blender take one
 TEMPORARY = "tmp"  # the kind that anybody may remove once its owner has gone
 _PREFIX = ".fmqm-"
 _LOCK = "owner.lock"

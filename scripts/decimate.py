@@ -18,12 +18,12 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
+from fmqm_addon.batch.interrupt import stops_wait
 from fmqm_addon.batch.progress_log import Log
 from fmqm_addon.batch.scorer import REMEDIES
 from fmqm_addon.blender.access import Access
 from fmqm_addon.blender.materials.types import Reading
 from fmqm_addon.cli.process import FAILED, OK, prepare_bpy, run_script
-from fmqm_addon.cli.stops import stops_wait
 from fmqm_addon.metric.errors import FMQMError, OutsideError, SettingsError, one_line
 from fmqm_addon.metric.settings import PRESETS, Settings
 from scripts.score import OneLineParser, add_access, check_access
@@ -31,7 +31,7 @@ from scripts.score import OneLineParser, add_access, check_access
 PROGRAM = "decimate.py"
 
 if TYPE_CHECKING:
-    from fmqm_addon.blender.scene.decimate import Found, Outcome, Reduced, Step
+    from fmqm_addon.comparison.decimation import DecimationResult, SearchResult, Step, TargetResult
 
 
 def build_parser() -> OneLineParser:
@@ -124,7 +124,8 @@ def _search(args: argparse.Namespace, targets: list[float], settings: Settings, 
         texture_sizes,
         written_reader,
     )
-    from fmqm_addon.blender.scene.decimate import Wish, reducing
+    from fmqm_addon.blender.scene.bvh import BVHQuery
+    from fmqm_addon.comparison.decimation import DecimationGoal, decimating
     from fmqm_addon.report.atomic_files import check_writable, print_parts, write_text
 
     outputs = _output_names(args.output, targets if args.chain else [])
@@ -138,9 +139,9 @@ def _search(args: argparse.Namespace, targets: list[float], settings: Settings, 
         check_outputs(args.reference, files, reading)
     with stops_wait():
         sizes = () if args.target_texture is None else tuple(texture_sizes(args.reference, reading))
-    wish = Wish(tuple(targets), args.max_triangles, args.target_texture, sizes)
+    goal = DecimationGoal(tuple(targets), args.max_triangles, args.target_texture, sizes)
     written = written_reader(args.reference, outputs[0], reading) if outputs else None
-    stepper = reducing(file_reader(args.reference, reading), wish, settings, written)
+    stepper = decimating(file_reader(args.reference, reading), BVHQuery, goal, settings, written)
     more = True
     while more:
         with stops_wait():
@@ -148,10 +149,10 @@ def _search(args: argparse.Namespace, targets: list[float], settings: Settings, 
         log.show(stepper.progress.done, stepper.progress.stage)
     log.end()
 
-    reduced = stepper.result
-    errors, warnings = [], list(reduced.warnings)
-    saved: list[str | None] = [None] * len(reduced.outcomes)
-    for number, outcome in enumerate(reduced.outcomes):
+    result = stepper.result
+    errors, warnings = [], list(result.warnings)
+    saved: list[str | None] = [None] * len(result.results)
+    for number, outcome in enumerate(result.results):
         if not outcome.last.reached:
             errors.append(f"{args.reference}: {_missed(outcome, args.max_triangles, args.output)}")
         elif outputs:
@@ -161,10 +162,10 @@ def _search(args: argparse.Namespace, targets: list[float], settings: Settings, 
                 saved[number] = outputs[number]
             except FMQMError as error:
                 errors.append(str(error))
-    document = _json_text(args.reference, settings, reduced, saved)
+    document = _json_text(args.reference, settings, result, saved)
     if args.json and args.json != "-":
         write_text(args.json, document)
-    print_parts(out, [document if args.json == "-" else _table(reduced, saved)])
+    print_parts(out, [document if args.json == "-" else _table(result, saved)])
     for line in (*(f"warning: {warning}" for warning in warnings), *errors):
         log.say(line)
     return FAILED if errors else OK
@@ -178,7 +179,7 @@ def _output_names(output: str | None, chain: list[float]) -> list[str]:
     return [str(path.with_name(f"{path.stem}_LOD{number + 1}{path.suffix}")) for number in range(len(chain))]
 
 
-def _missed(outcome: Outcome, max_triangles: int | None, output: str | None) -> str:
+def _missed(outcome: TargetResult, max_triangles: int | None, output: str | None) -> str:
     best, target = outcome.last.best, outcome.last.target
     score = "nothing that could be measured" if best.fmqm is None else f"FMQM {best.fmqm:.4f}"
     kind, remedy = "", "ask for less"
@@ -193,10 +194,10 @@ def _missed(outcome: Outcome, max_triangles: int | None, output: str | None) -> 
     return f"the target {target:g} is missed even with {allowed}{kind} ({score}); {remedy}"
 
 
-def _table(reduced: Reduced, saved: Sequence[str | None]) -> str:
+def _table(result: DecimationResult, saved: Sequence[str | None]) -> str:
     """The path of every search, then what was found and where it was written."""
     rows = []
-    for outcome, path in zip(reduced.outcomes, saved, strict=True):
+    for outcome, path in zip(result.results, saved, strict=True):
         for found in (outcome.geometry, outcome.texture):
             if found is None:
                 continue
@@ -220,21 +221,21 @@ def _cells(step: Step) -> tuple[str, str, str, str]:
     return f"{step.version.ratio:.4f}", str(step.triangles), texture, "-" if step.fmqm is None else f"{step.fmqm:.4f}"
 
 
-def _json_text(reference: str, settings: Settings, reduced: Reduced, saved: Sequence[str | None]) -> str:
+def _json_text(reference: str, settings: Settings, result: DecimationResult, saved: Sequence[str | None]) -> str:
     document = {
         "reference": reference,
-        "triangles": reduced.triangles,
+        "triangles": result.triangles,
         "settings": settings.as_dict(),
-        "warnings": list(reduced.warnings),
+        "warnings": list(result.warnings),
         "found": [
             {"geometry": _found_dict(outcome.geometry), "texture": _found_dict(outcome.texture), "file": path}
-            for outcome, path in zip(reduced.outcomes, saved, strict=True)
+            for outcome, path in zip(result.results, saved, strict=True)
         ],
     }
     return json.dumps(document, indent=2, allow_nan=False) + "\n"
 
 
-def _found_dict(found: Found | None) -> dict[str, Any] | None:
+def _found_dict(found: SearchResult | None) -> dict[str, Any] | None:
     if found is None:
         return None
     return {

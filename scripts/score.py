@@ -21,8 +21,8 @@ from typing import TYPE_CHECKING, Any, NoReturn, TextIO
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from fmqm_addon import VERSION
-from fmqm_addon.batch.cluster import score_on_cluster
+from fmqm_addon.batch.cluster import WAIT, score_on_cluster
+from fmqm_addon.batch.interrupt import stops_wait
 from fmqm_addon.batch.journal import Journal, Records, row_key
 from fmqm_addon.batch.manifest import glob_files, lod_rows, plain_rows, read_manifest
 from fmqm_addon.batch.merge import Merged
@@ -42,20 +42,20 @@ from fmqm_addon.cli.process import (
     prepare_bpy,
     run_script,
 )
-from fmqm_addon.cli.stops import stops_wait
 from fmqm_addon.comparison.alignment import SPACES
 from fmqm_addon.folders import TEMPORARY, own_folder, sweep
 from fmqm_addon.metric.errors import FileError, FMQMError, SettingsError
 from fmqm_addon.metric.settings import CENTERS, COLOR_SPACES, POOLINGS, PRESETS, SETTING_NAMES, Settings
+from fmqm_addon.provenance import provenance
 from fmqm_addon.report.atomic_files import STDOUT, check_apart, check_writable, print_parts, write_parts
 from fmqm_addon.report.explain import explain
 from fmqm_addon.report.html.page import PAGE, write_page
 from fmqm_addon.report.html.pictures import has_pictures, open_report_folder
-from fmqm_addon.report.junit import below, junit_parts, shortfall
-from fmqm_addon.report.records import csv_parts, json_parts, table_parts, trust_parts
+from fmqm_addon.report.junit import junit_parts
+from fmqm_addon.report.records import below, csv_parts, json_parts, shortfall, table_parts, trust_parts
 
 if TYPE_CHECKING:
-    from fmqm_addon.comparison.pair import Answer
+    from fmqm_addon.comparison.pair import PairResult
 
 PROGRAM = "score.py"
 _STRANGERS = 600.0  # seconds that a pair of strangers' files may take
@@ -115,6 +115,9 @@ def build_parser() -> OneLineParser:
     batch.add_argument("--shard", metavar="I/N", help="score only every Nth pair, from the Ith on")
     batch.add_argument("--merge", metavar="FILE", nargs="+", help="score nothing: join the JSON outputs of shards")
     batch.add_argument("--dask", metavar="ADDRESS", help="score on the Dask cluster of this scheduler")
+    batch.add_argument(
+        "--wait-workers", type=float, metavar="SECONDS", help=f"for a first worker of the cluster (default: {WAIT:g})"
+    )
     batch.add_argument("--worker", metavar="SHARD", help=argparse.SUPPRESS)  # score a shard for the process above
 
     settings = parser.add_argument_group("settings (the paper's values are the defaults)")
@@ -173,6 +176,11 @@ def build_parser() -> OneLineParser:
     )
     output.add_argument("--csv", metavar="FILE", help="one row a pair; - is stdout, as above")
     output.add_argument("--junit", metavar="FILE", help="one test case a pair, for build servers; - as above")
+    output.add_argument(
+        "--csv-raw",
+        action="store_true",
+        help="names in the CSV as they are, though a spreadsheet take one for a formula",
+    )
     output.add_argument("--report", metavar="DIR", help="a web page with pictures: DIR/index.html")
     output.add_argument("--save-fields", metavar="FILE.npz", help="samples, fields and patch scores of the one pair")
     output.add_argument("--picture", metavar="FILE.png", help="reference, distorted and heat map of the one pair")
@@ -246,7 +254,7 @@ def main(argv: Sequence[str], out: TextIO) -> int:
             raise FMQMError("a worker without a shard; this is a fault of the program")
         if args.worker:
             prepare_bpy()
-            work_off(args.worker, options, limits.timeout)
+            work_off(args.worker, options, provenance(blender_version()), limits.timeout)
             return OK
         rows = _rows(args, options)
         outputs = _outputs(args)
@@ -289,10 +297,14 @@ def _check_arguments(args: argparse.Namespace) -> None:
     if args.dask and args.asset_root and not os.path.isabs(args.asset_root):
         raise SettingsError(f"--asset-root {args.asset_root}: with --dask name the folder from its root on")
     _check_sources(args)
-    for flag, least in (("jobs", 1), ("timeout", 0), ("memory_limit", 0)):
+    for flag, least in (("jobs", 1), ("timeout", 0), ("memory_limit", 0), ("wait_workers", 0)):
         value = getattr(args, flag)
         if value is not None and not (value >= 1 if least else 0 < value < float("inf")):
             raise SettingsError(f"{_flag(flag)} is {value}; it must be {'at least 1' if least else 'above 0'}")
+    if args.wait_workers is not None and not args.dask:
+        raise SettingsError("--wait-workers is for a cluster; give --dask too")
+    if args.csv_raw and not args.csv:
+        raise SettingsError("--csv-raw is how --csv writes; give that too")
     if args.dask and args.report and not os.path.isabs(args.report):
         raise SettingsError(f"--report {args.report}: with --dask name a folder that all hosts share, from its root on")
     if args.jobs and args.dask:
@@ -399,10 +411,12 @@ def _score(
     args: argparse.Namespace, rows: list[Row], options: Options, limits: Limits, argv: Sequence[str], out: TextIO
 ) -> int:
     """Scores what the journal has not, and writes what it has."""
-    versions = {"fmqm_version": VERSION, "blender_version": blender_version()}
+    versions = provenance(blender_version())
     keys = [row_key(row, options, versions) for row in rows]
     path = _journal_path(args)
-    journal = Journal(path, args.resume)
+    journal = Journal(path, args.resume, options.made_by(versions))
+    if journal.damaged:
+        tell(f"{PROGRAM}: {journal.damage()}\n")
     folder = os.path.dirname(path) if path else tempfile.gettempdir()
     kind = f"workers-{_digest(os.path.basename(path))}" if path else TEMPORARY
     if path:  # what a run of this journal that was killed has left
@@ -419,7 +433,8 @@ def _score(
     last = None
     try:
         if args.dask:
-            score_on_cluster(tasks, args.dask, argv, limits, journal, Log(PROGRAM, len(tasks), len(tasks), args.quiet))
+            log = Log(PROGRAM, len(tasks), len(tasks), args.quiet)
+            score_on_cluster(tasks, args.dask, argv, limits, journal, log, args.wait_workers or WAIT)
         elif use_workers:
             with own_folder(folder, kind) as place:
                 log = Log(PROGRAM, len(tasks), len(tasks), args.quiet)
@@ -447,7 +462,7 @@ def _write(
     records: Iterable[Mapping[str, Any]],
     settings: Mapping[str, Any],
     versions: Mapping[str, str],
-    last: Answer | None,
+    last: PairResult | None,
     out: TextIO,
 ) -> None:
     """What is to be known before the scores are believed, then the files, and in any case what is printed."""
@@ -455,7 +470,7 @@ def _write(
     head = dict(versions) | ({"shard": _shard(args.shard)} if args.shard else {})
     texts = [
         (args.json, json_parts(records, settings, head)),
-        (args.csv, csv_parts(records)),
+        (args.csv, csv_parts(records, args.csv_raw)),
         (args.junit, junit_parts(records)),
     ]
     try:
@@ -472,9 +487,9 @@ def _write(
         print_parts(out, _table_parts(args, records) if alone is None else alone)
 
 
-def _write_last(args: argparse.Namespace, last: Answer) -> None:
+def _write_last(args: argparse.Namespace, last: PairResult) -> None:
     from fmqm_addon.report.npz import save_fields
-    from fmqm_addon.report.render import write_picture
+    from fmqm_addon.report.sheet import write_picture
 
     result = last.comparison.result
     if args.save_fields:

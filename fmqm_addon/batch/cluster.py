@@ -1,99 +1,244 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pairs scored on an existing Dask cluster, whose workers have this package, bpy and the same files."""
+"""Pairs scored on an existing Dask cluster, whose workers have this package, bpy and the same files.
+
+All that travels is functions of Python's standard library and text: neither the scheduler nor a worker ever unpickles
+anything of this package, which a process that lacks it would not survive, nor the tasks of others with it.
+"""
 
 from __future__ import annotations
 
+import asyncio
 import importlib
+import json
+import operator
 import os
-import tempfile
-from collections.abc import Sequence
+import subprocess
+import sys
+import time
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from ..metric.errors import FMQMError
-from .journal import Journal
+from ..report.record_check import checked_json
+from .cluster_part import ROOT
+from .journal import Journal, differences, own_record, parse_line
 from .progress_log import Log
-from .rows import Task, grouped, task_of
-from .workers import Limits, score_with_workers, workers_command
+from .rows import Task, grouped
+from .workers import Limits
 
-ROOT = Path(__file__).resolve().parents[2]
 PAIRS_A_TASK = 4  # of one reference: few enough to spread and to lose
-RETRIES = 2  # of a task that raises; one whose worker is lost goes to another by Dask's own rule
+RETRIES = 2  # of a task that fails; one whose worker is lost goes to another by Dask's own rule
+WAIT = 30.0  # seconds for a first worker
 _CONNECT = 10.0  # seconds
+_ANSWER = 120.0  # seconds that a worker has to tell what it has: bpy comes over a network, perhaps
+_POLL = 0.1  # seconds between looks at what is done
+_LOOK = 5.0  # seconds between looks at who is still there
 
 
 def score_on_cluster(
-    tasks: Sequence[Task], address: str, arguments: Sequence[str], limits: Limits, journal: Journal, log: Log
+    tasks: Sequence[Task],
+    address: str,
+    arguments: Sequence[str],
+    limits: Limits,
+    journal: Journal,
+    log: Log,
+    wait: float = WAIT,
 ) -> None:
     """Scores all tasks into the journal, as they come.
 
     Args:
         address: of the scheduler, such as tcp://scheduler:8786. arguments: of this command line.
         log: counts the pairs.
+        wait: seconds for a first worker, and for another one when all are lost.
 
     Raises:
-        FMQMError: dask.distributed is not installed, or the scheduler cannot be reached.
+        FMQMError: dask.distributed is not installed, the scheduler cannot be reached, or no worker comes or can score.
     """
-    here = os.getcwd()
+    if not tasks:
+        return
     try:
         distributed: Any = importlib.import_module("distributed")
     except ImportError as error:
         raise FMQMError("--dask needs dask.distributed: pip install -r requirements-cluster.txt") from error
-    parts = [
-        group[first : first + PAIRS_A_TASK] for group in grouped(tasks) for first in range(0, len(group), PAIRS_A_TASK)
-    ]
     try:
         client = distributed.Client(address, timeout=_CONNECT, set_as_default=False)
     except (OSError, ValueError) as error:
         raise FMQMError(f"--dask {address}: no scheduler answers there ({error})") from error
     with client:
-        sent = {
-            client.submit(score_part, [task.as_dict() for task in part], list(arguments), limits, here, pure=False,
-                          retries=RETRIES): part
-            for part in parts
-        }  # fmt: skip
-        for future in distributed.as_completed(list(sent), loop=client.loop):
-            part = sent.pop(future)
-            if future.status == "finished":
-                for key, record in future.result():
-                    journal.done(key, record)
-                    log.scored(record)
-            else:  # error, or cancelled where the scheduler has gone
-                why = _cause(future.exception()) if future.status == "error" else future.status
-                for task in part:
-                    record = task.row.failed(f"{task.row.distorted}: its task failed on the cluster ({why})")
-                    journal.done(task.key, record)
-                    log.scored(record)
+        try:
+            client.wait_for_workers(1, timeout=wait)
+        except TimeoutError as error:
+            raise FMQMError(
+                f"--dask {address}: no worker within {wait:g} s; start some, or wait longer (--wait-workers)"
+            ) from error
+        pythons = _fit_workers(client, tasks[0], journal.made_by, log)
+        if not pythons:
+            raise FMQMError(f"--dask {address}: none of its workers can score")
+        asked = {"arguments": list(arguments), "limits": asdict(limits), "cwd": os.getcwd(), "made_by": journal.made_by}
+        sent = _send(client, tasks, pythons, asked)
+        _receive(distributed, client, sent, pythons, journal, log, wait)
     log.end()
 
 
+def _fit_workers(client: Any, first: Task, made_by: Mapping[str, str], log: Log) -> dict[str, list[str]]:
+    """The workers that can score, by their Python; of the others is told, a line a host, what they lack."""
+    asked = {"cwd": os.getcwd(), "files": [path for path in first.row.files() if path and os.path.isfile(path)]}
+    sizes = [os.stat(path).st_size for path in asked["files"]]
+    probe = (Path(__file__).parent / "probe.py").read_bytes()
+    lacks: dict[str, dict[str, str]] = defaultdict(dict)
+    pythons: dict[str, list[str]] = defaultdict(list)
+    # By modules of the standard library that every Dask worker has; in its own thread it must go on answering.
+    executables: dict[str, Any] = client.run(operator.attrgetter("executable"), sys, on_error="return")
+    for worker, each in executables.items():
+        if not isinstance(each, str):
+            lacks[_host(worker)][worker] = f"it does not answer ({each!r})"
+    for python in {each for each in executables.values() if isinstance(each, str)}:
+        answers: dict[str, Any] = client.run(
+            asyncio.to_thread,
+            subprocess.run,
+            [python, "-", json.dumps(asked)],
+            input=probe,
+            capture_output=True,
+            timeout=_ANSWER,
+            workers=[worker for worker, each in executables.items() if each == python],
+            on_error="return",
+        )
+        for worker, done in answers.items():
+            if lack := _lack(done, made_by, asked["files"], sizes):
+                lacks[_host(worker)][worker] = lack
+            else:
+                pythons[python].append(worker)
+    for host, by_worker in sorted(lacks.items()):
+        count = f"{len(by_worker)} worker{'s' if len(by_worker) > 1 else ''}"
+        log.say(f"{host}: {count} cannot score: {'; '.join(dict.fromkeys(by_worker.values()))}")
+    return pythons
+
+
+def _lack(done: Any, made_by: Mapping[str, str], files: Sequence[str], sizes: Sequence[int]) -> str:
+    """What a worker lacks, by what its Python printed; "" for nothing."""
+    try:
+        found = checked_json(done.stdout.decode("utf-8", "replace").splitlines()[-1])
+        if "no_fmqm" in found:
+            return f"no FMQM ({found['no_fmqm']}); start the workers with PYTHONPATH={ROOT}"
+        if "no_bpy" in found:
+            return f"no bpy ({found['no_bpy']})"
+        if difference := differences(found, made_by, ("fmqm_version", "fmqm_code", "blender_version")):
+            return f"{difference}; install the same"
+        for path, size, wanted in zip(files, found["sizes"], sizes, strict=True):
+            if size is None:
+                return f"{path} is missing in {os.getcwd()}"
+            if size != wanted:
+                return f"{path} is another file, of {size} bytes instead of {wanted}"
+    except (AttributeError, IndexError, KeyError, TypeError, ValueError):
+        words = getattr(done, "stderr", b"").decode("utf-8", "replace").strip().splitlines()
+        return f"its Python does not answer ({words[-1] if words else repr(done)})"
+    return ""
+
+
+_Sent = dict[Any, tuple[str, list[Task]]]  # by future: the Python that it was sent to, and its tasks
+
+
+def _send(client: Any, tasks: Sequence[Task], pythons: Mapping[str, Sequence[str]], asked: Mapping[str, Any]) -> _Sent:
+    """Parts of the tasks to workers that can score, spread over all of them."""
+    turns = [python for python, workers in pythons.items() for _ in workers]
+    sent: _Sent = {}
+    for group in grouped(tasks):
+        for first in range(0, len(group), PAIRS_A_TASK):
+            part, python = group[first : first + PAIRS_A_TASK], turns[len(sent) % len(turns)]
+            text = json.dumps({**asked, "tasks": [task.as_dict() for task in part]})
+            future = client.submit(
+                subprocess.run,
+                [python, "-m", f"{__package__}.cluster_part"],
+                input=text.encode(),
+                capture_output=True,
+                check=True,
+                workers=list(pythons[python]),
+                pure=False,
+                retries=RETRIES,
+            )
+            sent[future] = (python, part)
+    return sent
+
+
+def _receive(
+    distributed: Any,
+    client: Any,
+    sent: _Sent,
+    pythons: Mapping[str, Sequence[str]],
+    journal: Journal,
+    log: Log,
+    wait: float,
+) -> None:
+    """Takes what is done into the journal until all is; gives a part up whose workers are all gone."""
+    completed = distributed.as_completed(list(sent), loop=client.loop)
+    lost: dict[str, float] = {}  # since when a Python has no worker
+    looked = time.monotonic()
+    while sent:
+        for future in completed.next_batch(block=False):
+            if future in sent:
+                _, part = sent.pop(future)
+                _take(future, part, journal, log)
+        now = time.monotonic()
+        if now - looked > _LOOK:
+            looked, there = now, set(_workers_there(client))
+            for python, workers in pythons.items():
+                if there & set(workers):
+                    lost.pop(python, None)
+                elif now - lost.setdefault(python, now) > wait:
+                    why = "all workers that can score are gone; --resume goes on"
+                    for future in [each for each, (name, _) in sent.items() if name == python]:
+                        future.cancel()
+                        _fail(sent.pop(future)[1], why, journal, log)
+        time.sleep(_POLL)
+
+
+def _workers_there(client: Any) -> Sequence[str]:
+    """Addresses; none where the scheduler does not answer."""
+    try:
+        return list(client.nthreads())
+    except (OSError, TimeoutError):
+        return []
+
+
+def _take(future: Any, part: Sequence[Task], journal: Journal, log: Log) -> None:
+    """The records of a part that has ended, however it did."""
+    left = {task.key: task for task in part}
+    why = future.status  # cancelled, lost: the scheduler has gone
+    if future.status in ("finished", "error"):
+        why = "it told of no scores"
+        try:
+            lines = future.result().stdout.splitlines()
+        except Exception as error:  # what has happened there, whatever it was
+            lines, why = [], _cause(error)
+        for event in map(parse_line, lines):
+            task = left.pop(event.get("done", ""), None)
+            if task is not None:
+                record = own_record(event, journal.made_by)
+                journal.done(task.key, record)
+                log.scored(record)
+    _fail(list(left.values()), why, journal, log)
+
+
+def _fail(tasks: Sequence[Task], why: str, journal: Journal, log: Log) -> None:
+    for task in tasks:
+        record = task.row.failed(f"{task.row.distorted}: its task failed on the cluster ({why})")
+        journal.done(task.key, record)
+        log.scored(record)
+
+
 def _cause(error: BaseException) -> str:
-    """What a chain of exceptions began with, and the remedy of what is most likely."""
+    """What a chain of exceptions began with, and what a process said last."""
     while error.__cause__ is not None:
         error = error.__cause__
-    why = f"{type(error).__name__}: {str(error).partition(chr(10))[0]}"
-    if isinstance(error, ModuleNotFoundError) and error.name == __name__.partition(".")[0]:
-        why += f"; start the scheduler and its workers with PYTHONPATH={ROOT}"
-    return why
+    if isinstance(error, subprocess.CalledProcessError):
+        words = (error.stderr or b"").decode("utf-8", "replace").strip().splitlines()
+        return f"exit code {error.returncode}{f', saying: {words[-1]}' if words else ''}"
+    return f"{type(error).__name__}: {str(error).partition(chr(10))[0]}"
 
 
-def score_part(
-    plain_tasks: Sequence[dict[str, Any]], arguments: Sequence[str], limits: Limits, cwd: str
-) -> list[tuple[str, dict[str, Any]]]:
-    """What a task does on its host: a watched worker of its own, since bpy must not live in a thread.
-
-    Args:
-        cwd: what relative paths are relative to; a host on which it is missing gets by with absolute ones.
-
-    Returns:
-        For each pair its key and its record.
-    """
-    tasks = [task_of(plain) for plain in plain_tasks]
-    script = ROOT / "scripts" / "score.py"
-    journal = Journal()
-    with tempfile.TemporaryDirectory(prefix="fmqm-") as folder:
-        command = workers_command(str(script), arguments)
-        log = Log("", len(tasks), len(tasks), silent=True)
-        there = cwd if os.path.isdir(cwd) else None
-        score_with_workers(tasks, command, Path(folder), 1, limits, journal, log, there)
-    return [(task.key, journal.record(task.key)) for task in tasks]
+def _host(worker: str) -> str:
+    """Of an address such as tcp://10.0.0.5:4711."""
+    return worker.partition("://")[2].rpartition(":")[0] or worker

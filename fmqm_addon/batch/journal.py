@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What has been scored, on disk as it comes: one line of JSON for each event, each forced to the disk.
 
-{"start": key} before a pair, {"done": key, "pair": record} after it. Of two records of one pair the last counts.
+{"start": key} before a pair, {"done": key, "made_by": provenance, "pair": record} after it, each with a "digest" of
+what stands before it in the line; a line that does not fit it does not count. Of two records of a pair the last counts.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import hashlib
 import json
 import os
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import IO, Any
 
@@ -21,10 +22,12 @@ except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
 from ..metric.errors import FileError, SettingsError
-from ..report.records import RECORD_KEYS
+from ..report.record_check import checked_json, record_fault
+from ..report.records import PairScore, pair_record
 from .rows import Options, Row
 
 _BEGINNINGS = (b'{"start": "', b'{"done": "')  # of a line
+_TAIL = b', "digest": "'
 
 
 def row_key(row: Row, options: Options, versions: Mapping[str, str]) -> str:
@@ -52,13 +55,19 @@ class Journal:
     Args:
         path: the file; None is a temporary one without a name.
         resume: go on with what the file holds, less a last line that was torn; else it is replaced.
+        made_by: what makes the numbers, as Options.made_by has it; records of something else do not count.
+
+    Attributes:
+        damaged: lines that do not fit their digest, or are none of ours.
 
     Raises:
         FileError: it cannot be written. SettingsError: the file is something else, which is left as it is.
     """
 
-    def __init__(self, path: str | None = None, resume: bool = False) -> None:
+    def __init__(self, path: str | None = None, resume: bool = False, made_by: Mapping[str, str] | None = None) -> None:
         self.path = path
+        self.made_by = dict(made_by or {})
+        self.damaged = 0
         self._offsets: dict[str, int] = {}
         self._failed: set[str] = set()
         self._begun: set[str] = set()
@@ -90,13 +99,24 @@ class Journal:
         self._begun.add(key)
 
     def done(self, key: str, record: Mapping[str, Any]) -> None:
-        self._note(key, self._append({"done": key, "pair": record}), record)
+        self._note(key, self._append({"done": key, "made_by": self.made_by, "pair": record}), record)
 
     def record(self, key: str) -> dict[str, Any]:
-        """Raises KeyError if there is none."""
+        """Raises KeyError if there is none. FileError: the file is not what it was."""
         with self._reader(self._offsets[key]) as reader:
-            pair: dict[str, Any] = json.loads(reader.readline())["pair"]
+            event = _event(reader.readline())
+        if event.get("done") != key:
+            raise FileError(f"{self.path}: this journal was changed while it was in use; start again with --resume")
+        pair: dict[str, Any] = event["pair"]
         return pair
+
+    def damage(self) -> str:
+        """What is to be told where lines are damaged."""
+        lines = "1 line does" if self.damaged == 1 else f"{self.damaged} lines do"
+        return (
+            f"{self.path}: {lines} not fit the digest (a fault of the disk, an editor, or an older version); "
+            "pairs that no other line tells of are scored again"
+        )
 
     def close(self) -> None:
         self._file.close()
@@ -122,7 +142,8 @@ class Journal:
                     self._file.truncate(offset)
                     break
                 event = parse_line(line)
-                if "done" in event:
+                self.damaged += not event
+                if "done" in event and event["made_by"] == self.made_by:
                     self._note(event["done"], offset, event["pair"])
                 elif "start" in event:
                     self._begun.add(event["start"])
@@ -142,7 +163,7 @@ class Journal:
 
     def _append(self, event: Mapping[str, Any]) -> int:
         """Where the line begins. Written in one piece: a reader never sees the middle of two."""
-        rest = memoryview(json.dumps(event, allow_nan=False).encode() + b"\n")
+        rest = memoryview(line_of(event))
         begin = self._file.seek(0, os.SEEK_END)
         try:
             while rest:  # a disk that fills up takes a part first, and only then says so
@@ -173,18 +194,59 @@ def _lock(file: IO[bytes], path: str | None) -> None:
         pass  # a file system without locks
 
 
+def line_of(event: Mapping[str, Any]) -> bytes:
+    """The inverse of parse_line."""
+    body = json.dumps(event, allow_nan=False).encode().removesuffix(b"}")
+    return body + _TAIL + _digest(body) + b'"}\n'
+
+
 def parse_line(line: bytes) -> dict[str, Any]:
-    """An event; {} where a power cut or an editor left something else."""
-    try:
-        event = json.loads(line)
-    except (ValueError, RecursionError):
-        return {}
+    """An event; {} where a fault of the disk, a power cut, an editor or an older version left something else."""
+    event = _event(line)
     match event:
         case {"start": str(), **rest} if not rest:
-            return {"start": event["start"]}
-        case {"done": str(), "pair": dict() as pair} if pair.keys() >= RECORD_KEYS:
-            return {"done": event["done"], "pair": pair}
+            return event
+        case {"done": str(), "made_by": dict(), "pair": pair, **rest} if not rest and not record_fault(pair):
+            return event
     return {}
+
+
+def _event(line: bytes) -> dict[str, Any]:
+    """What a line holds that fits its digest."""
+    body, _, digest = line.rstrip(b"\r\n").rpartition(_TAIL)
+    if digest != _digest(body) + b'"}':
+        return {}
+    try:
+        event = checked_json(body + b"}")
+    except ValueError:
+        return {}
+    return event if isinstance(event, dict) else {}
+
+
+def _digest(body: bytes) -> bytes:
+    return hashlib.blake2b(body, digest_size=8).hexdigest().encode()
+
+
+def own_record(event: Mapping[str, Any], made_by: Mapping[str, str]) -> dict[str, Any]:
+    """The record of an event that comes from elsewhere; an error in its place where something else has made it."""
+    record: dict[str, Any] = event["pair"]
+    if event["made_by"] == made_by:
+        return record
+    why = f"{record['distorted']}: scored by {differences(event['made_by'], made_by)}; give its host the same"
+    return pair_record(PairScore(record["reference"], record["distorted"], error=why)) | {"id": record["id"]}
+
+
+def differences(found: Mapping[str, Any], wanted: Mapping[str, Any], names: Iterable[str] = ()) -> str:
+    """Where one provenance is not another, in words; "" where they are equal.
+
+    Args:
+        names: of what is looked at; none are all.
+    """
+    return ", ".join(
+        f"{name} {found.get(name)} instead of {wanted.get(name)}"
+        for name in names or {**wanted, **found}
+        if found.get(name) != wanted.get(name)
+    )
 
 
 class Records:

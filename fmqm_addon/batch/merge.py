@@ -3,18 +3,17 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from ..metric.errors import FileError
-from ..report.records import RECORD_KEYS
-from .journal import Journal
+from ..report.record_check import checked_json, is_settings, record_fault
+from .journal import Journal, differences
 from .progress_log import Log
 from .rows import Row
 
-_KEYS = RECORD_KEYS | {"settings", "fail_under"}
-_SHARED = ("fmqm_version", "blender_version", "settings")  # what all parts must agree on
+_TOLD = ("settings", "fail_under")  # what a record of an output has besides
+_MADE_BY = ("fmqm_version", "fmqm_code", "blender_version")
 
 
 class Merged:
@@ -48,16 +47,19 @@ class Merged:
         for path in paths:
             part = _read(path)
             first = first or part
-            for name in _SHARED:
-                if part[name] != first[name]:
-                    raise FileError(f"{path}: its {name} differ from those in {paths[0]}; scores do not compare")
+            if difference := differences(part, first, _MADE_BY):
+                raise FileError(
+                    f"{path}: made by {difference} in {paths[0]}; scores do not compare, score one of them anew"
+                )
+            if part["settings"] != first["settings"]:
+                raise FileError(f"{path}: its settings differ from those in {paths[0]}; scores do not compare")
             number, count = part.get("shard") or (0, 0)
             shards.add((number, count))
             for index, record in enumerate(part["pairs"]):
                 places.setdefault(record["id"], number + index * count)
                 self._add(record, path, log)
         self.settings: dict[str, Any] = first["settings"]
-        self.versions = {name: first[name] for name in _SHARED[:2]}
+        self.versions = {name: first[name] for name in _MADE_BY}
         if rows is not None:
             for row in rows:
                 if row.id not in self._journal:
@@ -106,17 +108,36 @@ def _difference(record: Mapping[str, Any], row: Row) -> str:
 
 
 def _read(path: str) -> dict[str, Any]:
+    """A part, every value of which is what it should be: whoever merges shows what others have sent."""
     try:
-        with open(path, encoding="utf-8") as file:
-            part = json.load(file)
-        wanted = {*_SHARED, "pairs"} <= set(part) and all(set(pair) >= _KEYS for pair in part["pairs"])
-        if "shard" in part:
-            number, count = map(int, part["shard"])
-            wanted = wanted and 1 <= number <= count
+        with open(path, "rb") as file:
+            part = checked_json(file.read())
     except OSError as error:
         raise FileError(f"{path}: cannot be read ({error.strerror})") from error
-    except (ValueError, TypeError, RecursionError):
-        wanted = False
-    if not wanted:
-        raise FileError(f"{path}: not a JSON output of score.py; those of --shard are wanted")
-    return part
+    except ValueError as error:
+        raise FileError(f"{path}: not a JSON output of score.py ({error})") from error
+    fault = _fault(part)
+    if fault:
+        raise FileError(f"{path}: not a JSON output of score.py, or an older one: {fault}")
+    checked: dict[str, Any] = part
+    return checked
+
+
+def _fault(part: Any) -> str:
+    """What is wrong with a part; "" for nothing."""
+    if not isinstance(part, dict):
+        return "it is no object"
+    for name in _MADE_BY:
+        if not isinstance(part.get(name), str):
+            return f"{name} is missing"
+    if not is_settings(part.get("settings")):
+        return "settings is missing"
+    if not isinstance(part.get("pairs"), list):
+        return "pairs is missing"
+    for index, pair in enumerate(part["pairs"], 1):
+        if fault := record_fault(pair) or "".join(f"{name} is missing" for name in _TOLD if name not in pair):
+            return f"pair {index}: {fault}"
+    match part.get("shard", [1, 1]):
+        case [int() as number, int() as count] if 1 <= number <= count:
+            return ""
+    return "shard is not such as [2, 5]"

@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -18,7 +20,7 @@ class Options:
     """How all pairs of a run are scored.
 
     Attributes:
-        settings: of the metric, before a row's own. repeats: seeds. space, match_scale: as comparison.alignment.place.
+        settings: of the metric, before a row's own. repeats: seeds. space, match_scale: as comparison.alignment.align.
         attribution: whose loss it is, too. explain: in words, too.
         report: folder of the report, for pictures; "" makes none. It changes no score.
         both: the other direction, too.
@@ -50,6 +52,11 @@ class Options:
         reading = ("bake", "max_image_side", "max_image_bytes")
         asked |= {name: getattr(self, name) for name in reading if getattr(self, name) is not None}
         return self.settings.as_dict() | rest | asked
+
+    def made_by(self, versions: Mapping[str, str]) -> dict[str, str]:
+        """What travels with each record, and is compared where it arrives: the code, and a digest of all options."""
+        text = json.dumps(self.as_dict(), sort_keys=True)
+        return {**versions, "settings": hashlib.blake2b(text.encode(), digest_size=8).hexdigest()}
 
 
 @dataclass(frozen=True)

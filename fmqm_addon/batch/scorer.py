@@ -5,12 +5,11 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from ..cli.stops import stops_wait
 from ..metric.errors import (
     FileError,
     FMQMError,
@@ -23,6 +22,7 @@ from ..metric.errors import (
 from ..report.explain import explain, where
 from ..report.html.pictures import picture_stem, write_pair_pictures
 from ..report.records import PairScore, pair_record
+from .interrupt import stops_wait
 from .journal import Journal
 from .progress_log import Log, tell
 from .rows import Options, Row, Task, grouped, task_of
@@ -30,9 +30,9 @@ from .workers import NOTE, end_when_stuck, end_with_parent, journal_of
 
 if TYPE_CHECKING:
     from ..blender.materials.types import Reading
-    from ..comparison.alignment import Placed
+    from ..comparison.alignment import AssetMesh
     from ..comparison.measurement import Measurement
-    from ..comparison.pair import Answer, Question
+    from ..comparison.pair import PairOptions, PairResult
     from ..metric.stepper import Stepper
 
 T = TypeVar("T")
@@ -46,7 +46,7 @@ REMEDIES: dict[type[Exception], str] = {
 
 def score_tasks(
     tasks: Sequence[Task], options: Options, journal: Journal, log: Log, before_each: Callable[[], None] | None = None
-) -> Answer | None:
+) -> PairResult | None:
     """Scores all into the journal; a pair that fails does not stop the others. None if the last one failed.
 
     Args:
@@ -64,7 +64,7 @@ def units_of(tasks: Sequence[Task]) -> int:
     return len(tasks) + len(grouped(tasks))
 
 
-def work_off(shard: str, options: Options, stuck_after: float) -> None:
+def work_off(shard: str, options: Options, versions: Mapping[str, str], stuck_after: float) -> None:
     """What a worker does: scores the tasks of a shard into the journal beside it, as long as its parent lives.
 
     Raises:
@@ -75,7 +75,7 @@ def work_off(shard: str, options: Options, stuck_after: float) -> None:
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise FileError(f"{shard}: no shard for a worker ({getattr(error, 'strerror', None) or error})") from error
     end_with_parent()
-    journal = Journal(journal_of(shard))
+    journal = Journal(journal_of(shard), made_by=options.made_by(versions))
     log = _WorkersLog("", units_of(tasks), len(tasks), silent=True)
     score_tasks(tasks, options, journal, log, lambda: end_when_stuck(stuck_after))
     journal.close()
@@ -92,7 +92,7 @@ class _Scorer:
     """Where the work is, group after group."""
 
     def __init__(self, options: Options, journal: Journal, log: Log, before_each: Callable[[], None] | None) -> None:
-        self.last: Answer | None = None
+        self.last: PairResult | None = None
         self._options = options
         self._journal = journal
         self._log = log
@@ -102,17 +102,18 @@ class _Scorer:
 
     def score(self, group: Sequence[Task]) -> None:
         """Prepares the reference that the tasks share, and scores them one by one."""
+        from ..blender.scene.bvh import BVHQuery
         from ..comparison.pair import measurement_of
 
         row = group[0].row
-        asked = _question(self._options, row)
+        asked = _pair_options(self._options, row)
         self._begin(group[0])
         began = time.perf_counter()
         failure = ""
         try:
             reference = self._load(row, row.reference, row.ref_texture)
             self._tell_memory(reference, asked)
-            measurement = measurement_of(reference, asked)
+            measurement = measurement_of(reference, BVHQuery, asked)
             self._work(measurement.prepare(), "preparing the reference")
         except Exception as error:
             failure = _told(error, row.reference)
@@ -150,14 +151,13 @@ class _Scorer:
         self._journal.start(task.key)
         self._seconds = {}
 
-    def _compare(self, pair: PairScore, row: Row, reference: Placed, measurement: Measurement) -> PairScore:
-        from ..comparison.pair import answering
+    def _compare(self, pair: PairScore, row: Row, reference: AssetMesh, measurement: Measurement) -> PairScore:
+        from ..comparison.pair import comparing_pair
         from ..report.trust_table import trust_dict
 
         loaded = self._load(row, row.distorted, row.texture)
-        answer = self._work(
-            answering(measurement, reference, loaded, _question(self._options, row)), f"scoring {row.id}"
-        )
+        options, known = _pair_options(self._options, row), _reading(self._options).facts
+        answer = self._work(comparing_pair(measurement, reference, loaded, options, known), f"scoring {row.id}")
         self.last = answer
         comparison, result = answer.comparison, answer.comparison.result
         return replace(
@@ -166,14 +166,14 @@ class _Scorer:
             stderr=comparison.stderr,
             patches=len(result.patches),
             samples=len(result.samples.positions),
-            space=answer.placement.label,
-            warnings=(*answer.placement.notes, *answer.warnings),
+            space=answer.alignment.label,
+            warnings=(*answer.alignment.notes, *answer.warnings),
             reverse=answer.reverse,
             trust=trust_dict(comparison.trust),
             findings=self._findings(row, answer),
         )
 
-    def _findings(self, row: Row, answer: Answer) -> dict[str, Any]:
+    def _findings(self, row: Row, answer: PairResult) -> dict[str, Any]:
         """What else the options ask for."""
         findings: dict[str, Any] = {}
         surfaces, result = (answer.reference, answer.comparison.distorted), answer.comparison.result
@@ -186,10 +186,10 @@ class _Scorer:
             findings["attribution"] = answer.attribution.as_dict()
         return findings
 
-    def _load(self, row: Row, name: str, image: str) -> Placed:
+    def _load(self, row: Row, name: str, image: str) -> AssetMesh:
         self._log.show(self._units, f"loading {name}")
         began = time.perf_counter()
-        from ..blender.files.load import load_placed
+        from ..blender.files.load import load_asset
         from ..blender.materials.images import load_texture
 
         reading = _reading(self._options)
@@ -197,11 +197,11 @@ class _Scorer:
             with stops_wait():
                 if image:
                     reading = replace(reading, texture=load_texture(row.path(image), reading.limits))
-                return load_placed(row.path(name), reading, self._log.note)
+                return load_asset(row.path(name), reading, self._log.note)
         finally:
             self._spent("load", time.perf_counter() - began)
 
-    def _tell_memory(self, reference: Placed, asked: Question) -> None:
+    def _tell_memory(self, reference: AssetMesh, asked: PairOptions) -> None:
         from ..comparison.memory import WORTH_SAYING, peak_bytes, peak_text
 
         if peak_bytes(reference.mesh, asked.settings, asked.repeats) > WORTH_SAYING:
@@ -227,26 +227,27 @@ def _told(error: Exception, name: str) -> str:
     return one_line(f"{name}: {kind.__name__}: {error}")
 
 
-def _question(options: Options, row: Row) -> Question:
-    from ..comparison.pair import Question
+def _pair_options(options: Options, row: Row) -> PairOptions:
+    from ..comparison.pair import PairOptions
 
-    return Question(
+    return PairOptions(
         options.settings_of(row),
         options.repeats,
         options.space,
         options.match_scale,
         options.both,
         options.attribution,
-        _reading(options),
     )
 
 
 def _reading(options: Options) -> Reading:
     """How all assets of a run are read, textures of their own aside."""
     from ..blender.access import Access
-    from ..blender.materials.image_headers import DEFAULT_LIMITS, Limits
+    from ..blender.materials.image_headers import DEFAULT_LIMITS, ImageLimits
     from ..blender.materials.types import Reading
 
-    limits = Limits(options.max_image_side or DEFAULT_LIMITS.side, options.max_image_bytes or DEFAULT_LIMITS.decoded)
+    limits = ImageLimits(
+        options.max_image_side or DEFAULT_LIMITS.side, options.max_image_bytes or DEFAULT_LIMITS.decoded
+    )
     reading = Reading(limits=limits, access=Access(options.untrusted, options.asset_root))
     return reading if options.bake is None else replace(reading, bake=options.bake, stand_in=options.bake > 0)

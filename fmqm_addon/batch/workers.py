@@ -22,14 +22,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..cli.process import TEMPORARY_PLACES, WORKER
-from ..cli.stops import stops_wait
+from ..folders import TEMPORARY_PLACES
 from ..metric.errors import FileError, FMQMError
-from .journal import Journal, parse_line
+from .interrupt import stops_wait
+from .journal import Journal, own_record, parse_line
 from .progress_log import Log
 from .rows import Task, grouped
 
 NOTE = "note: "  # begins a line that a worker prints for this process's log
+WORKER = "FMQM_WORKER"  # set in the environment of workers
 TRIES = 2  # a pair that ends its worker is tried once more
 _POLL = 0.1  # seconds between looks at the workers
 _WORTHWHILE = 5.0  # seconds of work that a worker is started for, at least
@@ -94,10 +95,11 @@ def adopt(folder: Path, journal: Journal) -> None:
     """Takes over the scores of workers whose parent was killed before it read them, and which pairs they were at."""
     for path in sorted(folder.glob("shard-*.jsonl")):
         for event in map(parse_line, path.read_bytes().splitlines()):
+            record = own_record(event, journal.made_by) if "done" in event else None
             if "start" in event and not journal.has_scores(event["start"]):
                 journal.start(event["start"])
-            elif "done" in event and event["pair"]["error"] is None and not journal.has_scores(event["done"]):
-                journal.done(event["done"], event["pair"])
+            elif record and record["error"] is None and not journal.has_scores(event["done"]):
+                journal.done(event["done"], record)
 
 
 class _Pool:
@@ -171,7 +173,7 @@ class _Pool:
             if "start" in event:
                 self._journal.start(event["start"])
             elif "done" in event:
-                self._finish(event["done"], event["pair"])
+                self._finish(event["done"], own_record(event, self._journal.made_by))
 
     def _finish(self, key: str, record: Mapping[str, Any]) -> None:
         self._barren = 0

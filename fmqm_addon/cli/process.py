@@ -15,13 +15,12 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NoReturn, TextIO
 
-from ..folders import keep_folder, remove_all
+from ..batch.interrupt import INTERRUPTED, kill_if_deaf, stop_on_signals, stopped, stops_wait
+from ..batch.workers import WORKER
+from ..folders import TEMPORARY_PLACES, keep_folder, remove_all
 from ..metric.errors import FMQMError
-from .stops import INTERRUPTED, kill_if_deaf, stop_on_signals, stopped, stops_wait
 
 OK, FAILED, WRONG_ARGUMENTS = 0, 1, 2  # exit codes, and INTERRUPTED
-WORKER = "FMQM_WORKER"  # set in the environment of workers
-TEMPORARY_PLACES = ("TMPDIR", "TEMP", "TMP")  # of them Python and Blender take one
 SYSTEM_PACKAGES = "libx11-6 libxrender1 libxxf86vm1 libxfixes3 libxi6 libxkbcommon0 libsm6 libice6 libgl1 libegl1"
 
 

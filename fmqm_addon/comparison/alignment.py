@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a compared mesh is put before it is measured. Arrays only.
+"""Aligning a compared mesh with its reference before it is measured. Arrays only.
 
 The reference stays where it stands in the world. The compared mesh is brought to it in one of three ways,
 of which LODs set side by side, and imports that carry transforms, need the second or third:
@@ -23,9 +23,9 @@ from ..metric.geometry import Floats, cross
 from ..metric.surface import MeshArrays
 
 SPACES = ("auto", "world", "local")
-PLACE_LABELS = {"world": "world", "location": "world without location", "local": "local"}
+SPACE_LABELS = {"world": "world", "location": "world without location", "local": "local"}
 
-APART = 0.01  # of the diagonal; boxes that differ by less stand in one place
+APART = 0.01  # of the diagonal; boxes that differ by less coincide
 TIMES_BETTER = 10.0  # Auto leaves the world only for a fit this much better
 SUSPICIOUS = 0.05  # of the diagonal; boxes that differ by more get a warning
 # Factors between units: metric prefixes, inch, foot, and their inverses. No yard: artists scale by 1.1, too.
@@ -43,8 +43,8 @@ _TINY = 1e-6  # of the diagonal; a misfit below it is rounding
 
 
 @dataclass(frozen=True)
-class Placed:
-    """A mesh and where it stands.
+class AssetMesh:
+    """An asset's mesh in its own frame, with the transform to its world.
 
     Attributes:
         mesh: positions in the asset's own frame.
@@ -55,24 +55,25 @@ class Placed:
     origin: Floats
 
     def world(self) -> MeshArrays:
+        """The mesh in its world."""
         return moved(self.mesh, self.origin)
 
 
 @dataclass(frozen=True)
-class Placement:
-    """A compared mesh where it is measured.
+class Alignment:
+    """A compared mesh, brought to where it is measured.
 
     Attributes:
         mesh: in the reference's world.
-        place: "world", "location" or "local". turn: degrees about X; 0 leaves it as it is.
+        space: "world", "location" or "local". turn: degrees about X; 0 leaves it as it is.
         factor: its size was divided by this; 1 leaves it.
         misfit: how far the boxes' corners are apart, in the reference's box diagonals.
         to_world: (4, 4) float64, from where it is measured to where it stands.
-        notes: what Auto or Match Scale did. warnings: what makes the place doubtful.
+        notes: what Auto or Match Scale did. warnings: what makes it doubtful.
     """
 
     mesh: MeshArrays
-    place: str
+    space: str
     turn: int
     factor: float
     misfit: float
@@ -83,7 +84,7 @@ class Placement:
     @property
     def label(self) -> str:
         """As the reports name it: "world", "local, size / 100", "world, turned by 90 degrees about X"."""
-        parts = [PLACE_LABELS[self.place]]
+        parts = [SPACE_LABELS[self.space]]
         if self.turn:
             parts.append(f"turned by {self.turn} degrees about X")
         if self.factor != 1:
@@ -91,14 +92,14 @@ class Placement:
         return ", ".join(parts)
 
 
-def place_counts(label: str) -> bool:
-    """Whether moving an object changes a score that was measured at the place of a Placement.label."""
-    return label.partition(",")[0] == PLACE_LABELS["world"]
+def location_counts(label: str) -> bool:
+    """Whether moving an object changes a score that was measured in the space of an Alignment.label."""
+    return label.partition(",")[0] == SPACE_LABELS["world"]
 
 
 @dataclass(frozen=True)
 class _Candidate:
-    place: str
+    space: str
     turn: int
     matrix: Floats  # (4, 4), from the compared mesh's own frame
     box: Floats  # (2, 3)
@@ -106,20 +107,20 @@ class _Candidate:
     misfit: float
 
 
-def place(reference: Placed, compared: Placed, space: str = "auto", match_scale: bool = False) -> Placement:
+def align(reference: AssetMesh, compared: AssetMesh, space: str = "auto", match_scale: bool = False) -> Alignment:
     """Brings the compared mesh to the reference.
 
     Args:
         space: of SPACES: "world" or "local", or "auto": the world, unless the boxes differ there by more than APART and
-            another place fits TIMES_BETTER; a turn is tried where none does.
+            another space fits TIMES_BETTER; a turn is tried where none does.
         match_scale: undo a difference in size by one of UNIT_FACTORS.
 
     Raises:
         MeshError: a transform that has to be undone has a scale of zero.
     """
     target = _box(reference.mesh, reference.origin)
-    places = {"auto": ("world", "location", "local"), "world": ("world",), "local": ("local",)}[space]
-    candidates = [_candidate(name, 0, reference, compared, target, match_scale) for name in places]
+    spaces = {"auto": ("world", "location", "local"), "world": ("world",), "local": ("local",)}[space]
+    candidates = [_candidate(name, 0, reference, compared, target, match_scale) for name in spaces]
     chosen = candidates[0]
     if chosen.misfit > APART:
         best = min(candidates, key=_roughly)  # of equal ones the first
@@ -135,9 +136,9 @@ def place(reference: Placed, compared: Placed, space: str = "auto", match_scale:
         candidates += turned
         if best.misfit * TIMES_BETTER <= chosen.misfit:
             chosen = best
-    return Placement(
+    return Alignment(
         mesh=moved(compared.mesh, chosen.matrix),
-        place=chosen.place,
+        space=chosen.space,
         turn=chosen.turn,
         factor=chosen.factor,
         misfit=chosen.misfit,
@@ -173,7 +174,7 @@ def misfit(box: Floats, target: Floats) -> float:
 
 
 def _matrix(name: str, turn: int, reference: Floats, compared: Floats) -> Floats:
-    """(4, 4), from the compared mesh's own frame to the place of that name."""
+    """(4, 4), from the compared mesh's own frame to the space of that name."""
     if name == "local":
         return reference.copy()
     matrix = _TURNED[turn] @ compared if turn else compared.copy()
@@ -183,7 +184,7 @@ def _matrix(name: str, turn: int, reference: Floats, compared: Floats) -> Floats
 
 
 def _candidate(
-    name: str, turn: int, reference: Placed, compared: Placed, target: Floats, match_scale: bool
+    name: str, turn: int, reference: AssetMesh, compared: AssetMesh, target: Floats, match_scale: bool
 ) -> _Candidate:
     mesh, matrix = compared.mesh, _matrix(name, turn, reference.origin, compared.origin)
     box = _box(mesh, matrix)
@@ -200,7 +201,7 @@ def _roughly(candidate: _Candidate) -> float:
     return float(np.round(candidate.misfit / _TINY))
 
 
-def _best_turned(turned: list[_Candidate], reference: Placed, mesh: MeshArrays) -> _Candidate:
+def _best_turned(turned: list[_Candidate], reference: AssetMesh, mesh: MeshArrays) -> _Candidate:
     """The best fit. A box may fit as well upside down: then where the surface lies in it decides."""
     best = min(turned, key=_roughly)
     equal = [candidate for candidate in turned if candidate.misfit <= best.misfit + APART]
@@ -227,7 +228,7 @@ def _lopsidedness(mesh: MeshArrays, matrix: Floats) -> Floats:
 
 
 def _transformed(positions: Floats, matrix: Floats) -> Floats:
-    """The same arithmetic as in blender.scene.mesh_arrays, so that the same mesh has the same bits."""
+    """The one arithmetic for all meshes, so that the same mesh has the same bits."""
     with np.errstate(all="ignore"):  # coordinates that are not finite are dealt with by the metric
         return positions @ matrix[:3, :3].T + matrix[:3, 3]
 
@@ -254,9 +255,9 @@ def _undo(matrix: Floats, origin: Floats, name: str) -> Floats:
 
 def _notes(name: str, chosen: _Candidate, space: str) -> tuple[str, ...]:
     parts = []
-    if chosen.place == "location" and space == "auto":
+    if chosen.space == "location" and space == "auto":
         parts.append("without its location, since it stands beside the reference")
-    elif chosen.place == "local" and space == "auto":
+    elif chosen.space == "local" and space == "auto":
         parts.append("in local space, since it fits the reference only without its transform")
     if chosen.turn:
         parts.append(f"turned by {chosen.turn} degrees about X, since its axes differ from the reference's")

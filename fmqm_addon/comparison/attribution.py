@@ -56,7 +56,7 @@ class Attribution:
 
     @property
     def phrase(self) -> str:
-        """For people."""
+        """The finding in words."""
         return {
             "nothing": "there is hardly any loss",
             "geometry": "most of the loss is the geometry",
@@ -72,7 +72,7 @@ class Attribution:
 def attribute(
     measurement: Measurement, reference: MeshArrays, distorted: MeshArrays, compared: Comparison
 ) -> Stepper[Attribution]:
-    """Two more comparisons on the same samples.
+    """A stepper over two more comparisons on the same samples.
 
     Args:
         measurement: that reference was prepared in.
@@ -156,6 +156,7 @@ class NearestColor:
     surface: Surface
 
     def lookup(self, values: Floats) -> Floats:
+        """(N, 3) encoded colors at (N, 3) places; a metric.color.Color."""
         points = self.surface.frame.enter(values)
         triangle = self.surface.query.nearest(points, None)
         _, weights = closest_on(self.surface, points, triangle)

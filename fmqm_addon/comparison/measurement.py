@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes in, scores out: the metric with Blender's trees, over one or several seeds, in steps."""
+"""Meshes in, scores out: the metric over one or several seeds, with its trust report, in steps."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..blender.scene.bvh import BVHQuery
 from ..metric.errors import MeshError
 from ..metric.evaluation import Evaluation, Result, Scores
 from ..metric.geometry import Floats
 from ..metric.settings import Settings
 from ..metric.stepper import Progress, Stepper, Work, as_part, as_work
-from ..metric.surface import MeshArrays, Surface, preparing_surface
-from .trust import Fact, Trust, assessing, surface_facts
+from ..metric.surface import MeshArrays, QueryBuilder, Surface, preparing_surface
+from .surface_facts import Fact, surface_facts
+from .trust import Trust, assessing
 
 
 @dataclass(frozen=True)
@@ -48,10 +48,16 @@ class Comparison:
 
 
 class Measurement:
-    """A reference, prepared once for any number of comparisons, each over `repeats` seeds."""
+    """A reference, prepared once for any number of comparisons.
 
-    def __init__(self, reference: MeshArrays, settings: Settings, repeats: int = 1) -> None:
+    Args:
+        build_query: makes the spatial query of a surface; under Blender blender.scene.bvh.BVHQuery.
+        repeats: of each comparison, with the seeds settings.seed to settings.seed + repeats - 1.
+    """
+
+    def __init__(self, reference: MeshArrays, build_query: QueryBuilder, settings: Settings, repeats: int = 1) -> None:
         self._mesh = reference
+        self._build_query = build_query
         self._settings = settings
         self._repeats = repeats
         self._evaluations: list[Evaluation] = []
@@ -63,10 +69,11 @@ class Measurement:
         return self._evaluations[0].reference
 
     def prepare(self) -> Stepper[None]:
+        """A stepper over preparing the reference, which comes before any comparison."""
         return Stepper(self._prepare())
 
     def compare(self, distorted: MeshArrays, known: Sequence[Fact] = ()) -> Stepper[Comparison]:
-        """Scores and their trust report.
+        """A stepper over scoring a distorted mesh, with its trust report.
 
         Args:
             known: facts about the pair that begin the report, such as where the two were put.
@@ -74,7 +81,7 @@ class Measurement:
         return Stepper(self._compare(distorted, known))
 
     def reverse(self, distorted: MeshArrays) -> Stepper[Scores]:
-        """The other direction, the distorted mesh as the reference: mean scores over the seeds.
+        """A stepper over the other direction, the distorted mesh as the reference: mean scores over the seeds.
 
         Sees what only the distorted mesh has, and costs a preparation of its own.
         """
@@ -82,7 +89,7 @@ class Measurement:
 
     def _prepare(self) -> Work[None]:
         yield Progress("prepare", 0.0)
-        surface = yield from as_work(preparing_surface(self._mesh, BVHQuery), "prepare", 0.0, 0.05)
+        surface = yield from as_work(preparing_surface(self._mesh, self._build_query), "prepare", 0.0, 0.05)
         yield Progress("prepare", 0.05)
         for repeat in range(self._repeats):
             evaluation = Evaluation(surface, self._settings.with_seed(self._settings.seed + repeat))
@@ -110,7 +117,7 @@ class Measurement:
         )
 
     def _reverse(self, distorted: MeshArrays) -> Work[Scores]:
-        other = Measurement(distorted, self._settings, self._repeats)
+        other = Measurement(distorted, self._build_query, self._settings, self._repeats)
         yield from as_part(other.prepare(), 0.0, 0.5)
         _, results = yield from other._results(self._mesh, 0.5, 0.5)
         return Scores(*_mean([result.scores for result in results])[0].tolist())
@@ -118,7 +125,7 @@ class Measurement:
     def _results(self, distorted: MeshArrays, first: float, share: float) -> Work[tuple[Surface, list[Result]]]:
         """The prepared mesh and its result for each seed; progress goes from first on by the share."""
         yield Progress("prepare", first)
-        preparing = preparing_surface(distorted, BVHQuery, self.reference.frame)
+        preparing = preparing_surface(distorted, self._build_query, self.reference.frame)
         surface = yield from as_work(preparing, "prepare", first, first + 0.05 * share)
         yield Progress("prepare", first + 0.05 * share)
         results = []

@@ -1,35 +1,36 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One pair, from where its two meshes are put to all that is asked about them, in steps: the button, the Python API
-and the script score their pairs with this."""
+"""One pair, from aligning its two meshes to all that is wanted of their comparison, in steps.
+
+The button, the Python API and the scripts score their pairs with this.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..blender.materials.types import MAX_BAKE, Reading
-from ..blender.trust import known_facts
 from ..metric.errors import SettingsError
 from ..metric.evaluation import Scores
 from ..metric.settings import Settings
 from ..metric.stepper import Stepper, Work, as_part
-from ..metric.surface import Surface
-from .alignment import SPACES, Placed, Placement, place
+from ..metric.surface import QueryBuilder, Surface
+from .alignment import SPACES, Alignment, AssetMesh, align
 from .attribution import Attribution, attribute
 from .measurement import Comparison, Measurement
+from .surface_facts import Fact
 
 
 @dataclass(frozen=True)
-class Question:
-    """What is asked about pairs.
+class PairOptions:
+    """How a pair is scored, and what else is wanted of it.
 
     Attributes:
         settings: of the metric. repeats: seeds settings.seed to settings.seed + repeats - 1.
-        space, match_scale: as in comparison.alignment.place.
+        space, match_scale: as in comparison.alignment.align.
         both: score the other direction too. attribution: score geometry and texture apart too.
-        reading: how the materials are read.
 
     Raises:
-        SettingsError: one of these is none that can be asked.
+        SettingsError: one of these has a value that it cannot have.
     """
 
     settings: Settings = Settings()
@@ -38,7 +39,6 @@ class Question:
     match_scale: bool = False
     both: bool = False
     attribution: bool = False
-    reading: Reading = Reading()
 
     def __post_init__(self) -> None:
         if not isinstance(self.settings, Settings):
@@ -47,13 +47,11 @@ class Question:
             raise SettingsError(f"repeats is {self.repeats}; it must be at least 1")
         if self.space not in SPACES:
             raise SettingsError(f"space is {self.space!r}; it must be one of {', '.join(SPACES)}")
-        if not 0 <= self.reading.bake <= MAX_BAKE:
-            raise SettingsError(f"bake is {self.reading.bake}; it must be between 0 and {MAX_BAKE}")
 
 
 @dataclass(frozen=True)
-class Answer:
-    """What came of it.
+class PairResult:
+    """A scored pair.
 
     Attributes:
         reference: the prepared surface; comparison holds the other one.
@@ -62,7 +60,7 @@ class Answer:
     """
 
     reference: Surface
-    placement: Placement
+    alignment: Alignment
     comparison: Comparison
     reverse: Scores | None
     attribution: Attribution | None
@@ -70,33 +68,56 @@ class Answer:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What should be known before the scores are believed."""
-        return (*self.placement.warnings, *self.comparison.warnings)
+        return (*self.alignment.warnings, *self.comparison.warnings)
 
 
-def measurement_of(reference: Placed, asked: Question) -> Measurement:
-    """To be prepared once for all pairs of the reference."""
-    return Measurement(reference.world(), asked.settings, asked.repeats)
+def measurement_of(reference: AssetMesh, build_query: QueryBuilder, options: PairOptions) -> Measurement:
+    """The measurement of a reference, to be prepared once for all its pairs."""
+    return Measurement(reference.world(), build_query, options.settings, options.repeats)
 
 
-def answering(measurement: Measurement, reference: Placed, compared: Placed, asked: Question) -> Stepper[Answer]:
-    """Args:
-        measurement: measurement_of(reference, asked), prepared.
+def comparing_pair(
+    measurement: Measurement,
+    reference: AssetMesh,
+    compared: AssetMesh,
+    options: PairOptions,
+    known: Sequence[Fact] = (),
+) -> Stepper[PairResult]:
+    """A stepper over aligning and comparing a mesh with the reference of a measurement.
+
+    Args:
+        measurement: measurement_of(reference, ..., options), prepared.
+        known: facts for the trust report that are known before, such as how the materials were read.
 
     Raises:
         MeshError, while stepping: the compared mesh cannot be measured.
     """
-    return Stepper(_answering(measurement, reference, compared, asked))
+    return Stepper(_comparing_pair(measurement, reference, compared, options, known))
 
 
-def _answering(measurement: Measurement, reference: Placed, compared: Placed, asked: Question) -> Work[Answer]:
-    placement = place(reference, compared, asked.space, asked.match_scale)
-    share = 1 / (1 + asked.both + 2 * asked.attribution)  # attribution makes two comparisons
-    comparing = measurement.compare(placement.mesh, known_facts(placement, asked.reading))
+def _comparing_pair(
+    measurement: Measurement,
+    reference: AssetMesh,
+    compared: AssetMesh,
+    options: PairOptions,
+    known: Sequence[Fact],
+) -> Work[PairResult]:
+    alignment = align(reference, compared, options.space, options.match_scale)
+    share = 1 / (1 + options.both + 2 * options.attribution)  # attribution makes two comparisons
+    comparing = measurement.compare(alignment.mesh, (*_alignment_facts(alignment), *known))
     comparison = yield from as_part(comparing, 0.0, share)
     reverse, attribution = None, None
-    if asked.both:
-        reverse = yield from as_part(measurement.reverse(placement.mesh), share, share)
-    if asked.attribution:
-        attributing = attribute(measurement, reference.world(), placement.mesh, comparison)
+    if options.both:
+        reverse = yield from as_part(measurement.reverse(alignment.mesh), share, share)
+    if options.attribution:
+        attributing = attribute(measurement, reference.world(), alignment.mesh, comparison)
         attribution = yield from as_part(attributing, 1 - 2 * share, 2 * share)
-    return Answer(measurement.reference, placement, comparison, reverse, attribution)
+    return PairResult(measurement.reference, alignment, comparison, reverse, attribution)
+
+
+def _alignment_facts(alignment: Alignment) -> tuple[Fact, ...]:
+    return (
+        Fact("space", alignment.label, "where the two were compared"),
+        Fact("size_divided_by", alignment.factor, "factor between units"),
+        Fact("boxes_apart", alignment.misfit, "share of the reference's box diagonal"),
+    )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far to trust a score: facts about two surfaces and about their comparison, each with its unit.
+"""How far to trust a score: facts about the comparison of two surfaces, each with its unit.
 
 The metric answers with a number whatever it is given. These facts say what it could not see (flipped faces,
 geometry that only the distorted mesh has, maps other than base color) and what it had to assume (a side of a
@@ -8,18 +8,18 @@ surface that has none, colors of places without texture coordinates). The paper 
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..metric.evaluation import Result
 from ..metric.fields import Fields, closest_on
-from ..metric.geometry import Floats, Ints, dot, morton_order, ranges
+from ..metric.geometry import Floats, dot, morton_order
 from ..metric.surface import Surface, triangle_areas, triangle_normals
-from ..metric.texture import MISSING, ImageFacts
+from ..metric.texture import MISSING
+from .surface_facts import NO_MATERIAL, Fact, Work, all_images, box_of, surface_facts
 
 # What should stop someone from believing the number. Shares.
 SIGN_IN_DOUBT = 0.01  # of samples whose side is doubtful on one mesh and not the same on both: the SDF's sign is noise
@@ -33,32 +33,9 @@ FLIPPED_COSINE = -0.5  # between the faces nearest to a sample, which noise and 
 # squares cosines and cannot see it
 ADDED_DISTANCE = 0.1  # of the median patch diagonal: far beyond what an LOD moves its surface
 ADDED_POINTS = 20_000  # over the distorted mesh; a share of 0.5 % is known to 0.05 %
-NO_MATERIAL = "(no material)"
 OPAQUE = 0.5  # a lower alpha is see-through
-UV_EDGE = 1e-5  # texture coordinates this far outside [0, 1] are on its edge, up to float32
-UV_GRIDS = (512, 256, 128, 64)  # cells a side of the texture; the first one that costs no more than
-UV_CELLS = 700_000  # cells to look at
-_UV_SHIFT = (0.3819660113, 0.7236067977)  # of the cells' centers: no edge of a usual UV map runs through these
-_CHUNK = 1 << 17  # cells of a step
+_SEEN = 1 << 14  # samples of a step
 _BATCH = 2048  # nearest points of a step
-
-T = TypeVar("T")
-Work = Generator[float, None, T]
-
-
-@dataclass(frozen=True)
-class Fact:
-    """One thing known about a score.
-
-    Attributes:
-        name: a key, in words joined by "_". value: what JSON can hold; None where it is not known.
-        unit: of the value. why: there is no value; "" where there is.
-    """
-
-    name: str
-    value: Any
-    unit: str
-    why: str = ""
 
 
 @dataclass(frozen=True)
@@ -122,44 +99,6 @@ def assessing(reference: Surface, distorted: Surface, result: Result, known: Seq
     return Trust(*facts, pair, _warnings(reference.name, distorted.name, result, facts, pair))
 
 
-def surface_facts(surface: Surface) -> Work[tuple[Fact, ...]]:
-    """What is known of a surface without a comparison; yields the share done, 0 to 0.4."""
-    preparation = surface.preparation
-    open_edges, non_manifold = edge_counts(surface.triangles)
-    yield 0.1
-    areas = triangle_areas(surface.vertices, surface.triangles)
-    layers, uv = _textured(surface)
-    yield 0.2
-    overlapping = yield from overlapping_share(uv, layers[layers >= 0])
-    yield 0.3
-    return (
-        Fact("triangles", preparation.given, "triangles"),
-        Fact("triangles_used", len(surface.triangles), "triangles"),
-        Fact("triangles_not_finite", preparation.not_finite, "triangles left out"),
-        Fact("triangles_flat", preparation.flat, "triangles left out"),
-        Fact("triangles_repeated", preparation.repeated, "triangles left out"),
-        Fact("vertices_welded", preparation.welded, "vertices"),
-        Fact("open_edges", open_edges, "edges"),
-        Fact("non_manifold_edges", non_manifold, "edges"),
-        Fact("watertight", open_edges == 0 and non_manifold == 0, "yes or no"),
-        Fact("box", surface.frame.leave(_box(surface.vertices)).tolist(), "scene units"),
-        *_uv_facts(uv, areas[layers >= 0], overlapping),
-        Fact(
-            "colors_from", {material.name or NO_MATERIAL: material.how for material in surface.materials}, "by material"
-        ),
-        Fact("images", _images(surface), "pixels"),
-    )
-
-
-def edge_counts(triangles: Ints) -> tuple[int, int]:
-    """How many edges of the welded triangles have one face, and how many more than two."""
-    first, second = triangles, np.roll(triangles, -1, axis=1)
-    keys = np.sort((np.minimum(first, second) * (int(triangles.max()) + 1) + np.maximum(first, second)).ravel())
-    start = np.flatnonzero(np.diff(keys, prepend=-1))
-    faces = np.diff(start, append=len(keys))
-    return int(np.count_nonzero(faces == 1)), int(np.count_nonzero(faces > 2))
-
-
 def in_doubt(fields: Fields, points: Floats, normals: Floats) -> NDArray[np.bool_]:
     """(N,) points whose sign, by parity, is not that of the nearest face's normal.
 
@@ -209,40 +148,6 @@ def added_share(
     return far / count
 
 
-def overlapping_share(uv: Floats, layers: Ints) -> Work[float | None]:
-    """Share of the used texture area that is used more than once; yields 0.3. None where no area is used.
-
-    Tiles lie on one another, as textures that repeat have them. An estimate: of the centers of a grid's cells,
-    those in more than one of the triangles, among those in any.
-
-    Args:
-        uv: (T, 3, 2) finite texture coordinates. layers: (T,) which texture; only those of one overlap.
-    """
-    tile = np.floor(_low(uv))
-    yield 0.3
-    for side in UV_GRIDS:
-        first, last = np.ceil((_low(uv) - tile) * side - _UV_SHIFT), np.floor((_high(uv) - tile) * side - _UV_SHIFT)
-        width, height = np.maximum(last - first + 1, 0).T
-        yield 0.3
-        if float((width * height).sum()) <= UV_CELLS:
-            break
-    else:
-        return None
-    cells = (width * height).astype(np.int64)
-    used = np.flatnonzero(cells)
-    used_keys = []
-    for group in _groups(used, cells[used]):
-        row = np.repeat(np.arange(len(group)), cells[group])
-        y, x = np.divmod(ranges(np.zeros_like(group), cells[group]), width[group].astype(np.int64)[row])
-        x, y = x + first[group, 0].astype(np.int64)[row], y + first[group, 1].astype(np.int64)[row]
-        corners = (uv[group] - tile[group, None]) * side - _UV_SHIFT
-        inside = _inside(corners, row, x.astype(np.float64), y.astype(np.float64))
-        used_keys.append(((layers[group[row]] * side + y % side) * side + x % side)[inside])
-        yield 0.3
-    keys, times = np.unique(np.concatenate(used_keys or [np.empty(0, np.int64)]), return_counts=True)
-    return float(np.count_nonzero(times > 1) / len(keys)) if len(keys) else None
-
-
 def differing_maps(reference: Surface, distorted: Surface) -> list[str]:
     """Inputs of shaders, other than what the metric sees, whose images are not the same on both; by name."""
     kept, now = (_maps(surface) for surface in (reference, distorted))
@@ -252,7 +157,7 @@ def differing_maps(reference: Surface, distorted: Surface) -> list[str]:
 def _maps(surface: Surface) -> dict[str, set[str]]:
     """The contents of the images, by the input that they feed, that the metric does not look at."""
     maps: dict[str, set[str]] = {}
-    for image in _all_images(surface):
+    for image in all_images(surface):
         if image.role not in {"base color", "alpha"}:
             maps.setdefault(image.role, set()).add(image.digest)
     return maps
@@ -271,77 +176,13 @@ def _patch_facts(result: Result) -> tuple[Fact, ...]:
     )
 
 
-def _uv_facts(uv: Floats, areas: Floats, overlapping: float | None) -> tuple[Fact, ...]:
-    total = float(areas.sum())
-    if not total > 0:
-        why = "no material has texture coordinates"
-        return (
-            Fact("uv_outside", None, "share of the textured area", why),
-            Fact("uv_overlapping", None, "share of the used texture area", why),
-            Fact("uv_missing", None, "share of the textured area", why),
-        )
-    low, high = _low(uv), _high(uv)
-    outside = (low.min(axis=1) < -UV_EDGE) | (high.max(axis=1) > 1 + UV_EDGE)
-    missing = ~(low.any(axis=1) | high.any(axis=1))
-    return (
-        Fact("uv_outside", float(areas[outside].sum()) / total, "share of the textured area"),
-        Fact(
-            "uv_overlapping",
-            overlapping,
-            "share of the used texture area",
-            "" if overlapping is not None else "the texture coordinates span no area, or far too much",
-        ),
-        Fact("uv_missing", float(areas[missing].sum()) / total, "share of the textured area"),
-    )
-
-
-def _textured(surface: Surface) -> tuple[Ints, Floats]:
-    """(T,) the material of each triangle that has texture coordinates, else -1; (n, 3, 2) those coordinates."""
-    channel = np.array([-1 if material.uv is None else material.uv for material in surface.materials])
-    first = channel[surface.material]
-    layers = np.where(first >= 0, surface.material, -1)
-    rows = np.flatnonzero(first >= 0)
-    if not rows.size:
-        return layers, np.empty((0, 3, 2))
-    uv = np.empty((len(rows), 3, 2))
-    for k in range(2):
-        uv[:, :, k] = surface.corners[rows, :, first[rows] + k]
-    return layers, uv
-
-
-def _low(uv: Floats) -> Floats:
-    """(T, 2) least of the three corners; faster than .min(axis=1)."""
-    return np.minimum(np.minimum(uv[:, 0], uv[:, 1]), uv[:, 2])
-
-
-def _high(uv: Floats) -> Floats:
-    return np.maximum(np.maximum(uv[:, 0], uv[:, 1]), uv[:, 2])
-
-
-def _groups(rows: Ints, cells: Ints) -> list[Ints]:
-    """The rows in groups of about _CHUNK cells."""
-    number = np.cumsum(cells) // _CHUNK
-    return np.split(rows, np.flatnonzero(np.diff(number)) + 1) if rows.size else []
-
-
-def _inside(corners: Floats, row: Ints, x: Floats, y: Floats) -> NDArray[np.bool_]:
-    """Whether (n,) points x, y are in the triangles row of (T, 3, 2) corners, whichever way these turn."""
-    left, right = np.ones(len(row), bool), np.ones(len(row), bool)
-    for k in range(3):
-        (ax, ay), (bx, by) = corners[:, k].T, corners[:, (k + 1) % 3].T
-        side = (bx - ax).take(row) * (y - ay.take(row)) - (by - ay).take(row) * (x - ax.take(row))
-        left &= side > 0
-        right &= side < 0
-    return left | right
-
-
 def _see_through(surface: Surface, fields: Fields) -> Work[float]:
     """Share of samples whose nearest place is transparent; yields 0.6."""
     has_alpha = np.array([material.alpha is not None for material in surface.materials])
     rows = np.flatnonzero(has_alpha[surface.material[fields.triangle]])
     count = 0
-    for first in range(0, len(rows), _CHUNK // 8):
-        batch = rows[first : first + _CHUNK // 8]
+    for first in range(0, len(rows), _SEEN):
+        batch = rows[first : first + _SEEN]
         triangle = fields.triangle[batch]
         _, weights = closest_on(surface, fields.nearest[batch], triangle)
         count += int(np.count_nonzero(surface.alpha_at(triangle, weights) < OPAQUE))
@@ -364,34 +205,10 @@ def _samples_by_material(surface: Surface, fields: Fields) -> dict[str, float]:
     return shares
 
 
-def _all_images(surface: Surface) -> tuple[ImageFacts, ...]:
-    """Each image once for each role."""
-    return tuple(dict.fromkeys(image for material in surface.materials for image in material.images))
-
-
-def _images(surface: Surface) -> list[dict[str, Any]]:
-    return [
-        {
-            "role": image.role,
-            "name": image.name,
-            "path": image.path,
-            "width": image.width,
-            "height": image.height,
-            "color_space": image.color_space,
-            "missing": image.missing,
-        }
-        for image in _all_images(surface)
-    ]
-
-
 def _diagonal(surface: Surface) -> float:
-    low, high = _box(surface.vertices)
+    low, high = box_of(surface.vertices)
     longest = float((high - low).max())
     return longest * float(np.linalg.norm((high - low) / longest))  # no square overflows
-
-
-def _box(vertices: Floats) -> Floats:
-    return np.stack([vertices.min(axis=0), vertices.max(axis=0)])
 
 
 def _share(mask: NDArray[np.bool_]) -> float:

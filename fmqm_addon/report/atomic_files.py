@@ -37,11 +37,12 @@ def replaced(path: str) -> Iterator[str]:
 
 
 def write_text(path: str, text: str) -> None:
+    """Writes a text file as UTF-8, whole or not at all."""
     write_parts(path, [text])
 
 
 def write_parts(path: str, parts: Iterable[str]) -> None:
-    """As write_text, for a text that is made while it is written."""
+    """Writes a text that is made meanwhile; as write_text."""
     with (
         replaced(path) as temporary,
         open(temporary, "w", encoding="utf-8", errors="backslashreplace", newline="") as file,
@@ -68,7 +69,7 @@ def print_parts(stream: TextIO, parts: Iterable[str]) -> None:
 
 
 def check_apart(outputs: Mapping[str, str | None], inputs: Iterable[str]) -> None:
-    """Outputs must not replace inputs or each other, by whatever names and links.
+    """Refuses outputs that would replace inputs or each other, by whatever names and links.
 
     Args:
         outputs: paths by the flags that name them; STDOUT and None are no files.

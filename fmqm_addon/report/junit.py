@@ -8,22 +8,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 from xml.etree import ElementTree
 
-from .records import SHOWN
+from .records import SHOWN, below, shortfall
 
 _NOT_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-
-
-def below(record: Mapping[str, Any]) -> bool:
-    """Whether a scored pair misses its threshold."""
-    return record["FMQM"] is not None and record["FMQM"] < (record["fail_under"] or 0)
-
-
-def shortfall(record: Mapping[str, Any]) -> str:
-    """By how much a pair that is below its threshold misses it; with so many digits that it shows."""
-    shown = f"{record['FMQM']:.4f}"
-    if float(shown) >= record["fail_under"]:
-        shown = repr(record["FMQM"])
-    return f"FMQM {shown} is below {record['fail_under']:g}"
 
 
 def junit_parts(records: Iterable[Mapping[str, Any]]) -> Iterator[str]:

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import re
 import textwrap
@@ -20,6 +18,8 @@ from .trust_table import Report, trust_text
 SHOWN = ("FMQM", *(name for name in COLUMNS if name != "FMQM"))  # the score first, then its features
 STAGES = ("load", "prepare", "fields", "features", "total")
 REVERSE = "reverse "  # before the names of the other direction's columns
+_FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "\uff1d", "\uff0b", "\uff0d", "\uff20")  # the last are wide ones
+_QUOTED = re.compile('[,"\r\n]')  # readers end a line at either of the last two
 _LONE = re.compile("[\ud800-\udfff]")
 
 
@@ -32,7 +32,7 @@ class PairScore:
         scores, stderr: None where there are none.
         seconds: by STAGES; what several pairs share is counted in the first.
         error: why there are no scores.
-        space: where the two were compared, as comparison.alignment.Placement.label has it.
+        space: where the two were compared, as comparison.alignment.Alignment.label has it.
         reverse: scores of the other direction, the distorted mesh as the reference; None: not asked for.
         trust: as report.trust_table.trust_dict has it.
         findings: what else was asked for, by its key in the record: where, attribution, pictures.
@@ -54,14 +54,17 @@ class PairScore:
 
 
 def json_text(pairs: Sequence[PairScore], settings: dict[str, Any], versions: dict[str, str]) -> str:
+    """The JSON document of pairs; as json_parts."""
     return "".join(json_parts(map(pair_record, pairs), settings, versions))
 
 
 def csv_text(pairs: Sequence[PairScore]) -> str:
+    """The CSV of pairs; as csv_parts."""
     return "".join(csv_parts([pair_record(pair) for pair in pairs]))
 
 
 def table_text(pairs: Sequence[PairScore]) -> str:
+    """The table of pairs; as table_parts."""
     return "".join(table_parts([pair_record(pair) for pair in pairs]))
 
 
@@ -84,10 +87,13 @@ def _json(value: Any) -> str:
     return _LONE.sub(lambda found: rf"\\u{ord(found[0]):x}", text)
 
 
-def csv_parts(records: Iterable[Mapping[str, Any]]) -> Iterator[str]:
+def csv_parts(records: Iterable[Mapping[str, Any]], raw: bool = False) -> Iterator[str]:
     """Numbers at full precision with a decimal point, whatever the locale; fields that failed are empty.
 
     The other direction's columns are there, at the end, where it was measured. Goes through the records twice.
+
+    Args:
+        raw: texts as they are. Else one that a spreadsheet would take for a formula comes after a single quote.
     """
     names = ("id", "reference", "distorted", *SHOWN, "error")
     turned = SHOWN if _any_reverse(records) else ()
@@ -95,7 +101,7 @@ def csv_parts(records: Iterable[Mapping[str, Any]]) -> Iterator[str]:
     for record in records:
         reverse = record["reverse"] or dict.fromkeys(SHOWN)
         values = [record[name] for name in names] + [reverse[name] for name in turned]
-        yield _csv_line("" if value is None else repr(value) if isinstance(value, float) else value for value in values)
+        yield _csv_line(values, raw)
 
 
 def table_parts(records: Iterable[Mapping[str, Any]]) -> Iterator[str]:
@@ -141,6 +147,19 @@ def pair_record(pair: PairScore) -> dict[str, Any]:
     }
 
 
+def below(record: Mapping[str, Any]) -> bool:
+    """Whether a scored pair misses its threshold."""
+    return record["FMQM"] is not None and record["FMQM"] < (record["fail_under"] or 0)
+
+
+def shortfall(record: Mapping[str, Any]) -> str:
+    """By how much a pair that is below its threshold misses it; with so many digits that it shows."""
+    shown = f"{record['FMQM']:.4f}"
+    if float(shown) >= record["fail_under"]:
+        shown = repr(record["FMQM"])
+    return f"FMQM {shown} is below {record['fail_under']:g}"
+
+
 def _any_reverse(records: Iterable[Mapping[str, Any]]) -> bool:
     return any(record["reverse"] is not None for record in records)
 
@@ -155,11 +174,17 @@ def _cells(record: Mapping[str, Any], both: bool) -> tuple[str, ...]:
     return (one_line(record["id"]), *(f"{record[name]:.4f}{spread[name]}" for name in SHOWN), *turned)
 
 
-def _csv_line(values: Iterable[str]) -> str:
-    out = io.StringIO()
-    # Before Python 3.13 only the characters of the line's ending are quoted, and readers end a line at either.
-    csv.writer(out, lineterminator="\r\n").writerow(values)
-    return out.getvalue().removesuffix("\r\n") + "\n"
+def _csv_line(values: Iterable[str | float | None], raw: bool = False) -> str:
+    return ",".join(_csv_cell(value, raw) for value in values) + "\n"
+
+
+def _csv_cell(value: str | float | None, raw: bool) -> str:
+    """As OWASP advises: a text that begins a formula follows a single quote, and is quoted. Numbers are numbers."""
+    if not isinstance(value, str):
+        return "" if value is None else repr(value)
+    is_formula = not raw and value.startswith(_FORMULA)
+    text = f"'{value}" if is_formula else value
+    return '"' + text.replace('"', '""') + '"' if is_formula or _QUOTED.search(text) else text
 
 
 def _columns(values: Scores | None) -> dict[str, float | None]:

@@ -2,14 +2,12 @@
 """Pictures of what was compared, drawn by casting camera rays through the surfaces' own spatial queries.
 
 A pixel's color comes from the same lookup as the color field (NCF), times a headlight's shade. No
-renderer and no graphics card take part. Only writing a PNG needs Pillow.
+renderer and no graphics card take part.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,18 +16,12 @@ from ..metric.errors import FMQMError
 from ..metric.evaluation import COLUMNS, Result
 from ..metric.geometry import Floats, Ints, closest_on_triangles, dot
 from ..metric.surface import Surface, triangle_normals
-from .atomic_files import replaced
-from .visual.colormap import NO_PATCH, score_colors
-from .visual.probe import plane_axes
-
-if TYPE_CHECKING:
-    from PIL.Image import Image
-    from PIL.ImageDraw import ImageDraw
+from .visual.axes import plane_axes
+from .visual.colormap import score_colors
 
 Pixels = NDArray[np.uint8]
 
 BACKGROUND = (236, 237, 239)  # light grey: stands on white pages and on dark ones
-INK, FAINT_INK, RULE = (32, 34, 38), (84, 88, 96), (150, 153, 158)
 
 # The camera looks from the front right, a little from above; Blender's front is -Y, and Z is up.
 AZIMUTH, ELEVATION = 32.0, 16.0  # degrees
@@ -43,9 +35,6 @@ CONTRAST = 0.16  # pixels that differ this much from a neighbor get more rays
 MORE_RAYS = np.array([(-1, -3), (3, -1), (1, 3), (-3, 1)]) / 8  # a turned square: no two in a row or column
 BATCH = 1 << 16  # rays per query
 HIDDEN_BEHIND = 0.01  # of the frame: what lies this much deeper than what is seen is hidden
-
-WIDTH = 1500  # pixels; the lengths and type sizes below are for a picture this wide
-GAP, BAR_WIDTH, BAR_SPACE, HEAD, FOOT = 24, 22, 86, 64, 60
 
 
 @dataclass(frozen=True)
@@ -268,125 +257,12 @@ def three_views(
     )
 
 
-def write_picture(path: str, reference: Surface, distorted: Surface, result: Result, width: int = WIDTH) -> None:
-    """A PNG of the reference, the distorted surface, and the reference colored by FMQM.
-
-    The file is replaced when the new one is complete, or not at all.
-
-    Args:
-        reference, distorted: what the result compares. width: of the picture, in pixels.
-
-    Raises:
-        FMQMError: Pillow is missing. FileError: the path cannot be written.
-    """
-    require_pillow()
-    with replaced(path) as temporary:
-        compose(reference, distorted, result, width).save(temporary, "PNG")
-
-
-def compose(reference: Surface, distorted: Surface, result: Result, width: int = WIDTH) -> Image:
-    """The picture of write_picture, as a Pillow image of so many pixels in width.
+def require_pillow() -> None:
+    """Checks that pictures can be written.
 
     Raises:
         FMQMError: Pillow is missing.
     """
-    require_pillow()
-    from PIL import Image, ImageDraw
-
-    sheet = _Sheet(width, natural_aspect(reference, distorted))
-    faces = score_by_face(result, reference)
-    camera = Camera.framing(reference, distorted, aspect=sheet.panel[1] / sheet.panel[0])
-    canvas = Image.new("RGB", (width, sheet.height), BACKGROUND)
-    for index, view in enumerate(three_views(reference, distorted, faces, camera, sheet.panel)):
-        canvas.paste(Image.fromarray(view), (sheet.left(index), sheet.top))
-    draw = ImageDraw.Draw(canvas)
-    score = result.scores.FMQM
-    features = [f"{name} {value:.3f}" for name, value in zip(COLUMNS[:4], result.scores[:4], strict=True)]
-    sheet.label(draw, 0, "Reference", reference.name, f"{len(reference.triangles):,} triangles")
-    sheet.label(draw, 1, "Distorted", distorted.name, f"{len(distorted.triangles):,} triangles")
-    sheet.label(draw, 2, f"FMQM {score:.4f}", "   ".join(features[:2]), "   ".join(features[2:]))
-    sheet.color_bar(draw, score, bool(np.isnan(faces).any()))
-    return canvas
-
-
-class _Sheet:
-    """Where things stand in the picture, in pixels.
-
-    Attributes:
-        panel: width and height of a panel. top: of the panels. height: of the whole.
-    """
-
-    def __init__(self, width: int, aspect: float) -> None:
-        self._unit = width / WIDTH  # type and spaces grow with the whole
-        panel_width = (width - self._px(4 * GAP + BAR_SPACE)) // 3
-        self.panel = (panel_width, round(panel_width * aspect))
-        self.top = self._px(HEAD)
-        self.height = self.top + self.panel[1] + self._px(FOOT)
-
-    def left(self, index: int) -> int:
-        """Of a panel; index 3 is the color bar."""
-        return self._px(GAP) + index * (self.panel[0] + self._px(GAP))
-
-    def label(self, draw: ImageDraw, index: int, title: str, *lines: str) -> None:
-        """A title above a panel and lines below it, centered."""
-        center = self.left(index) + self.panel[0] / 2
-        self._text(draw, (center, self._px(HEAD / 2)), title, 26, INK, "mm")
-        for number, line in enumerate(lines):
-            y = self.top + self.panel[1] + self._px(14 + 24 * number)
-            self._text(draw, (center, y), line, 17, FAINT_INK, "mm")
-
-    def color_bar(self, draw: ImageDraw, score: float, has_gaps: bool) -> None:
-        """Scores and their colors, 1 at the top, with a mark at the whole score."""
-        px = self._px
-        left, right = self.left(3), self.left(3) + px(BAR_WIDTH)
-        top, bottom = self.top + px(40), self.top + self.panel[1] - px(40)
-        rows = np.arange(bottom - top + 1)
-        for row, color in zip(rows.tolist(), score_colors(1 - rows / rows[-1]), strict=True):
-            draw.line([(left, top + row), (right, top + row)], fill=_to_bytes(color))
-        for tenth in range(0, 11, 2):
-            y = round(bottom - (bottom - top) * tenth / 10)
-            draw.line([(right + px(3), y), (right + px(8), y)], fill=RULE, width=max(px(1), 1))
-            self._text(draw, (right + px(13), y), f"{tenth / 10:.1f}", 16, INK, "lm")
-        y = round(bottom - (bottom - top) * score)
-        draw.polygon([(left - px(2), y), (left - px(11), y - px(6)), (left - px(11), y + px(6))], fill=INK)
-        self._text(draw, (left, top - px(24)), "FMQM", 16, INK, "lm")
-        if has_gaps:
-            y = bottom + px(24)
-            draw.rectangle([left, y - px(6), left + px(12), y + px(6)], fill=_to_bytes(np.array(NO_PATCH)))
-            self._text(draw, (left + px(18), y), "no patch", 14, FAINT_INK, "lm")
-
-    def _px(self, length: float) -> int:
-        """A length in a picture of the usual WIDTH, here."""
-        return round(length * self._unit)
-
-    def _text(
-        self, draw: ImageDraw, at: tuple[float, float], text: str, size: int, color: tuple[int, int, int], anchor: str
-    ) -> None:
-        """Text in one line; what is wider than a panel loses its middle."""
-        from PIL import ImageFont
-
-        font = ImageFont.load_default(max(self._px(size), 1))
-        shown = shorten(text, lambda part: draw.textlength(part, font=font) <= self.panel[0])
-        draw.text(at, shown, fill=color, font=font, anchor=anchor)
-
-
-def shorten(text: str, fits: Callable[[str], bool]) -> str:
-    """The text, or its two ends with dots between that fit."""
-    if fits(text):
-        return text
-    kept = len(text) - 1
-    while kept > 2 and not fits(f"{text[: kept - kept // 2]}...{text[-(kept // 2) :]}"):
-        kept -= 1
-    return f"{text[: kept - kept // 2]}...{text[-(kept // 2) :]}"
-
-
-def _to_bytes(color: Floats) -> tuple[int, int, int]:
-    red, green, blue = np.rint(color * 255).astype(int).tolist()
-    return red, green, blue
-
-
-def require_pillow() -> None:
-    """Raises FMQMError where pictures cannot be written."""
     try:
         import PIL.Image  # noqa: F401
     except ImportError as error:

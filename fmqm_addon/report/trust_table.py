@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ..comparison.trust import Fact, Trust
+from ..comparison.surface_facts import Fact
+from ..comparison.trust import Trust
 from ..metric.errors import one_line
 
 Report = dict[str, dict[str, dict[str, Any]]]  # group, fact, "value" and "unit"

@@ -14,7 +14,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..blender.scene.fingerprint import fingerprint, in_edit_mode
-from ..comparison.alignment import place_counts
+from ..comparison.alignment import location_counts
 from . import session
 from .properties.items import item_target, kept
 from .properties.rows import row_targets
@@ -38,7 +38,7 @@ def check(scene: bpy.types.Scene) -> None:
         if row.error or in_edit_mode(reference) or in_edit_mode(target):
             continue
         was = row.fingerprint.partition(" ")[::2]
-        now = [mark(asset, place_counts(row.space)) for asset in (reference, target)]
+        now = [mark(asset, location_counts(row.space)) for asset in (reference, target)]
         parts = []
         for asset, before, after in ((reference, was[0], now[0]), (target, was[1], now[1])):
             if not after:

@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from fmqm_addon.batch.journal import Journal
 from fmqm_addon.batch.rows import task_of
 from fmqm_addon.batch.workers import end_with_parent, journal_of
-from fmqm_addon.report.records import PairScore, pair_record
+from fmqm_addon.report.records import SHOWN, PairScore, pair_record
 
 shard = Path(sys.argv[-1])
 end_with_parent()
@@ -24,7 +24,7 @@ if sys.argv[1] == "refuse":
 Path(sys.argv[1]).joinpath(f"{os.getpid()}.pid").touch()
 if Path(sys.argv[1], "slow").exists():
     time.sleep(3)
-journal = Journal(journal_of(str(shard)))
+journal = Journal(journal_of(str(shard)), made_by={"fmqm_code": "other"} if Path(sys.argv[1], "other").exists() else {})
 for task in (task_of(plain) for plain in json.loads(shard.read_text(encoding="utf-8"))):
     journal.start(task.key)
     name = task.row.distorted
@@ -44,5 +44,5 @@ for task in (task_of(plain) for plain in json.loads(shard.read_text(encoding="ut
         swollen = bytearray(300_000_000)
         swollen[::4096] = b"x" * len(swollen[::4096])
         time.sleep(60)
-    scores = {"id": task.row.id, "FMQM": 0.5, "pid": os.getpid()}
-    journal.done(task.key, pair_record(PairScore("reference", name)) | scores)
+    scores = dict.fromkeys(SHOWN, 0.5) | {"id": task.row.id, "pid": os.getpid()}
+    journal.done(task.key, pair_record(PairScore("reference", name, patches=200)) | scores)

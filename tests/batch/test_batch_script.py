@@ -181,7 +181,7 @@ def test_what_nobody_has_foreseen_is_an_error_of_its_pair(
     pytest.importorskip("bpy")
     from fmqm_addon.blender.files import load as files
 
-    load = files.load_placed
+    load = files.load_asset
 
     def fail(path: str, *others: Any) -> Any:
         if "shaken1" in path:
@@ -190,7 +190,7 @@ def test_what_nobody_has_foreseen_is_an_error_of_its_pair(
             raise OverflowError("too large")
         return load(path, *others)
 
-    monkeypatch.setattr(files, "load_placed", fail)
+    monkeypatch.setattr(files, "load_asset", fail)
     journal = Journal()
     names = [("ref.obj", "shaken1.obj"), ("shaken2.obj", "ref.obj"), ("ref.obj", "ref.obj")]
     tasks = [Task(str(k), Row(f"id {k}", *pair, folder=str(assets))) for k, pair in enumerate(names)]

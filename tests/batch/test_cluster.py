@@ -5,15 +5,25 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import time
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
+import distributed
 import pytest
 
+from fmqm_addon.batch.cluster import _lack, _take
+from fmqm_addon.batch.journal import Journal, line_of
+from fmqm_addon.batch.progress_log import Log
+from fmqm_addon.batch.rows import Row, Task
+from fmqm_addon.provenance import code_digest, provenance
+from fmqm_addon.report.records import SHOWN, PairScore, pair_record
 from tests.blender.script import SCORE, noise, read_json, score, without_seconds, write_png, write_torus
 
 TINY = ("--samples", "640", "--patches", "20", "--color-units", "5")
@@ -31,12 +41,17 @@ def assets(tmp_path: Path) -> Path:
     return tmp_path
 
 
+ROOT = str(SCORE.parents[1])
+
+
 @pytest.fixture
 def cluster(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
-    """The scheduler's address and its two workers, without nannies that would start them again."""
+    """The scheduler's address and its workers, without nannies that would start them again.
+
+    Its parameter is what PYTHONPATH each of the workers has; the scheduler, which needs nothing of ours, has none.
+    """
     told = tmp_path / "scheduler.json"
-    root = getattr(request, "param", str(SCORE.parents[1]))
-    env = os.environ | {"PYTHONPATH": root, "DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "10s"}
+    env = os.environ | {"PYTHONPATH": "", "DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "10s"}
     common = {"env": env, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": tmp_path}
     start = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0"]
     processes = [subprocess.Popen([*start, "--no-dashboard", "--scheduler-file", str(told)], **common)]
@@ -47,7 +62,8 @@ def cluster(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[tuple[st
             time.sleep(0.1)
         address = json.loads(told.read_text())["address"]
         start = [sys.executable, "-m", "distributed.cli.dask_worker", address, "--host", "127.0.0.1", "--nthreads", "1"]
-        for _ in range(2):
+        for root in getattr(request, "param", [ROOT, ROOT]):
+            common["env"] = env | {"PYTHONPATH": root.format(tmp_path)}
             processes.append(subprocess.Popen([*start, "--no-nanny", "--no-dashboard"], **common))
         yield address, processes[1:]
     finally:
@@ -83,14 +99,108 @@ def test_all_pairs_are_scored_once_though_a_worker_is_killed(
     assert far == here
 
 
-@pytest.mark.once
-@pytest.mark.parametrize("cluster", [""], indirect=True, ids=["no PYTHONPATH"])
-def test_a_cluster_without_the_package_says_what_to_do(
+@pytest.mark.parametrize("cluster", [["", ""]], indirect=True, ids=["no PYTHONPATH"])
+def test_workers_without_the_package_are_told_of_and_live_on(
     assets: Path, cluster: tuple[str, list[subprocess.Popen[bytes]]]
 ) -> None:
-    done = score("ref.obj", NAMES[0], *TINY, "--dask", cluster[0], "--quiet", cwd=assets)
-    assert done.returncode == 1 and len(done.stderr.splitlines()) == 1
-    assert "No module named 'fmqm_addon'" in done.stderr and f"PYTHONPATH={SCORE.parents[1]}" in done.stderr
+    address, workers = cluster
+    for _ in range(2):
+        done = score("ref.obj", NAMES[0], *TINY, "--dask", address, "--quiet", cwd=assets)
+        first, second = done.stderr.splitlines()
+        assert done.returncode == 1 and "127.0.0.1: " in first and "no FMQM (ModuleNotFoundError" in first
+        assert first.endswith(f"start the workers with PYTHONPATH={ROOT}")
+        assert second == f"score.py: --dask {address}: none of its workers can score"
+        assert all(worker.poll() is None for worker in workers)
+
+
+@pytest.mark.parametrize("cluster", [["{}/other", ROOT, ""]], indirect=True, ids=["other code"])
+def test_only_workers_with_the_same_code_score(
+    assets: Path, cluster: tuple[str, list[subprocess.Popen[bytes]]]
+) -> None:
+    """One has ours, one has none, one has a metric that gives other numbers."""
+    address, workers = cluster
+    for name in ("fmqm_addon", "scripts"):
+        shutil.copytree(Path(ROOT, name), assets / "other" / name)
+    changed = assets / "other" / "fmqm_addon" / "metric" / "settings.py"
+    changed.write_text(changed.read_text().replace("sigma: float = 0.05", "sigma: float = 0.06"))
+    wait_for(address, len(workers))
+    command = ["--manifest", "pairs.json", *TINY, "--quiet"]
+    done = score(*command, "--json", "far.json", "--dask", address, cwd=assets)
+    assert done.returncode == 1, "a file is missing"
+    told = done.stderr.splitlines()[0]
+    assert "127.0.0.1: 2 workers cannot score" in told and "no FMQM" in told
+    assert f"instead of {code_digest()}; install the same" in told
+    score(*command, "--json", "here.json", cwd=assets)
+    assert without_seconds(read_json(assets / "far.json")) == without_seconds(read_json(assets / "here.json"))
+    assert all(worker.poll() is None for worker in workers)
+
+
+def wait_for(address: str, count: int) -> None:
+    with distributed.Client(address, set_as_default=False) as client:
+        client.wait_for_workers(count, timeout=30)
+
+
+def test_what_comes_back_by_other_code_is_an_error() -> None:
+    """Should a worker's checkout change while it scores."""
+    pair = pair_record(PairScore("r", "d", patches=200)) | dict.fromkeys(SHOWN, 0.5)
+    lines = line_of({"done": "k", "made_by": {"fmqm_code": "other"}, "pair": pair})
+    future = SimpleNamespace(status="finished", result=lambda: SimpleNamespace(stdout=lines))
+    journal = Journal(made_by={"fmqm_code": "ours"})
+    _take(future, [Task("k", Row("d", "r", "d")), Task("l", Row("e", "r", "e"))], journal, Log("", 2, 2, silent=True))
+    assert "scored by fmqm_code other instead of ours" in journal.record("k")["error"]
+    assert journal.record("l")["error"] == "e: its task failed on the cluster (it told of no scores)"
+
+
+def test_a_file_that_a_worker_does_not_see_is_named() -> None:
+    ours = provenance("5.2.3")
+
+    def lack(size: int | None, **changed: Any) -> str:
+        answer = json.dumps(ours | {"sizes": [size]} | changed).encode()
+        done = SimpleNamespace(stdout=b"bpy greets you\n" + answer + b"\n", stderr=b"")
+        return _lack(done, ours, ["ref.obj"], [7])
+
+    assert lack(7) == ""
+    assert lack(None) == f"ref.obj is missing in {os.getcwd()}"
+    assert lack(8) == "ref.obj is another file, of 8 bytes instead of 7"
+    assert lack(7, blender_version="4.5.15") == "blender_version 4.5.15 instead of 5.2.3; install the same"
+    assert lack(7, no_bpy="ImportError: libX11.so.6") == "no bpy (ImportError: libX11.so.6)"
+    older = {name: value for name, value in ours.items() if name != "fmqm_code"}
+    done = SimpleNamespace(stdout=json.dumps(older | {"sizes": [7]}).encode(), stderr=b"")
+    assert "fmqm_code None instead of" in _lack(done, ours, ["ref.obj"], [7])
+    for stdout in (b"", b"{", b"7", b"{}", b"[]"):
+        done = SimpleNamespace(stdout=stdout, stderr=b"Segmentation fault\n")
+        assert _lack(done, ours, ["ref.obj"], [7])
+    assert _lack(TimeoutError("120"), ours, [], []) == "its Python does not answer (TimeoutError('120'))"
+
+
+@pytest.mark.parametrize("cluster", [[]], indirect=True, ids=["no workers"])
+def test_without_a_worker_it_says_so_in_time(assets: Path, cluster: tuple[str, list[subprocess.Popen[bytes]]]) -> None:
+    began = time.monotonic()
+    done = score("ref.obj", NAMES[0], "--dask", cluster[0], "--wait-workers", "1", "--quiet", cwd=assets)
+    assert done.returncode == 1 and time.monotonic() - began < 20
+    assert done.stderr == (
+        f"score.py: --dask {cluster[0]}: no worker within 1 s; start some, or wait longer (--wait-workers)\n"
+    )
+
+
+@pytest.mark.once
+def test_when_all_workers_are_lost_the_rest_is_an_error(
+    assets: Path, cluster: tuple[str, list[subprocess.Popen[bytes]]]
+) -> None:
+    address, workers = cluster
+    arguments = ["--manifest", "pairs.json", *TINY, "--quiet", "--json", "far.json", "--dask", address]
+    command = [sys.executable, str(SCORE), *arguments, "--wait-workers", "2"]
+    run = subprocess.Popen(command, cwd=assets, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    journal = assets / "far.json.journal.jsonl"
+    end = time.monotonic() + 60
+    while not journal.exists() or b"done" not in journal.read_bytes():
+        assert run.poll() is None and time.monotonic() < end, run.communicate()[1]
+        time.sleep(0.02)
+    for worker in workers:
+        worker.kill()
+    _, told = run.communicate(timeout=60)
+    assert run.returncode == 1 and "all workers that can score are gone; --resume goes on" in told
+    assert "Traceback" not in told
 
 
 @pytest.mark.once

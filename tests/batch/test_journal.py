@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import errno
+import hashlib
+import json
 import os
 from dataclasses import replace
 from pathlib import Path
@@ -11,18 +13,20 @@ from typing import Any
 
 import pytest
 
-from fmqm_addon.batch.journal import Journal, Records, parse_line, row_key
+from fmqm_addon.batch.journal import Journal, Records, line_of, own_record, parse_line, row_key
 from fmqm_addon.batch.rows import Options, Row
 from fmqm_addon.metric.errors import FileError, SettingsError
 from fmqm_addon.metric.settings import Settings
-from fmqm_addon.report.records import PairScore, pair_record
+from fmqm_addon.report.record_check import record_fault
+from fmqm_addon.report.records import SHOWN, PairScore, pair_record
 
 VERSIONS = {"fmqm_version": "1", "blender_version": "5"}
 OPTIONS = Options(Settings())
 
 
 def record(name: str, score: float | None = 0.5) -> dict[str, Any]:
-    return pair_record(PairScore("r", name, error=None if score else "broken")) | {"FMQM": score}
+    pair = PairScore("r", name, patches=200, error=None if score else "broken")
+    return pair_record(pair) | dict.fromkeys(SHOWN, score)
 
 
 def test_resuming_finds_what_was_done_and_replacing_does_not(tmp_path: Path) -> None:
@@ -180,3 +184,79 @@ def test_records_come_in_the_rows_order_with_their_names_and_thresholds() -> Non
         ("two", 0.75, {"radius": "inf"}),
     ]
     assert list(records) == list(records)
+
+
+def line(event: dict[str, Any]) -> bytes:
+    """As line_of, whatever the event holds."""
+    body = json.dumps(event).encode().removesuffix(b"}")
+    return body + b', "digest": "' + hashlib.blake2b(body, digest_size=8).hexdigest().encode() + b'"}\n'
+
+
+def done(**changed: Any) -> dict[str, Any]:
+    return {"done": "a", "made_by": {}, "pair": record("a") | changed}
+
+
+def test_no_flipped_bit_goes_unseen() -> None:
+    right = line_of(done())
+    assert parse_line(right) == done() and right == line(done())
+    for place in range(len(right) - 1):
+        for bit in range(8):
+            flipped = bytearray(right)
+            flipped[place] ^= 1 << bit
+            assert parse_line(bytes(flipped)) == {}, bytes(flipped)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"FMQM": float("nan")}, {"FMQM": "0.5"}, {"FMQM": 1.5}, {"FMQM": True}, {"FMQM": None}, {"FMQM": 10**400},
+        {"error": "broken"}, {"error": 7}, {"id": None}, {"seconds": {}}, {"seconds": None}, {"warnings": "text"},
+        {"warnings": [1]}, {"stderr": {}}, {"reverse": 1}, {"patches": -1}, {"patches": 0.5}, {"trust": {}},
+        {"trust": {"reference": 1}}, {"where": 7}, {"attribution": {}}, {"pictures": {"size": ["1", "2"]}},
+        {"settings": []}, {"fail_under": "x"},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_a_record_of_another_shape_is_refused_though_its_digest_fits(tmp_path: Path, changed: dict[str, Any]) -> None:
+    assert parse_line(line(done(**changed))) == {}
+    less = record("a")
+    del less[next(iter(changed)) if next(iter(changed)) in less else "id"]
+    assert parse_line(line({"done": "a", "made_by": {}, "pair": less})) == {}
+    path = tmp_path / "j"
+    path.write_bytes(line(done(**changed)))
+    journal = Journal(str(path), resume=True)
+    assert "a" not in journal and journal.damaged == 1
+    assert journal.damage().startswith(f"{path}: 1 line does not fit") and "\n" not in journal.damage()
+
+
+def test_a_journal_of_before_the_digests_is_scored_again(tmp_path: Path) -> None:
+    path = tmp_path / "j"
+    old = [{"start": "a"}, {"done": "a", "pair": record("a")}]
+    path.write_text("".join(json.dumps(event) + "\n" for event in old), encoding="utf-8")
+    journal = Journal(str(path), resume=True)
+    assert "a" not in journal and journal.damage().startswith(f"{path}: 2 lines do not fit")
+    journal.done("a", record("a"))
+    assert journal.has_scores("a")
+
+
+def test_what_other_code_has_made_is_not_taken(tmp_path: Path) -> None:
+    path = str(tmp_path / "j")
+    ours, others = {"fmqm_code": "1"}, {"fmqm_code": "2"}
+    journal = Journal(path, made_by=others)
+    journal.done("a", record("a"))
+    journal.close()
+    resumed = Journal(path, resume=True, made_by=ours)
+    assert "a" not in resumed and resumed.damaged == 0
+    told = own_record(done() | {"made_by": others}, ours)
+    assert told["error"] == "a: scored by fmqm_code 2 instead of 1; give its host the same" and told["FMQM"] is None
+    assert not record_fault(told)
+    assert own_record(done() | {"made_by": ours}, ours) == record("a")
+
+
+def test_a_journal_that_changes_under_a_run_is_an_error_of_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "j"
+    journal = Journal(str(path))
+    journal.done("a", record("a"))
+    path.write_bytes(path.read_bytes().replace(b"0.5", b"0.6"))
+    with pytest.raises(FileError, match="was changed while it was in use"):
+        journal.record("a")

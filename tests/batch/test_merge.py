@@ -15,7 +15,7 @@ import pytest
 from fmqm_addon.report.records import PairScore, pair_record
 from scripts.score import main
 
-HEAD = {"fmqm_version": "1", "blender_version": "4", "settings": {}}
+HEAD = {"fmqm_version": "1", "fmqm_code": "c", "blender_version": "4", "settings": {}}
 
 
 def write_part(folder: Path, *names: str, **more: Any) -> str:
@@ -129,3 +129,88 @@ def test_what_only_scoring_does_is_refused(
     with pytest.raises(SystemExit) as ended:
         main(["--merge", write_part(tmp_path, "a"), *flag, "--csv", str(tmp_path / "c")], io.StringIO())
     assert ended.value.code == 2 and f"leave out {flag[0]}" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["fmqm_version", "fmqm_code", "blender_version"])
+def test_parts_of_different_code_do_not_mix(tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    first = Path(write_part(tmp_path, "a")).rename(tmp_path / "first.json")
+    second = Path(write_part(tmp_path, "b"))
+    document = json.loads(second.read_text())
+    second.write_text(json.dumps(document | {name: "newer"}))
+    assert main(["--merge", str(first), str(second), "--csv", str(tmp_path / "c")], io.StringIO()) == 1
+    told = capsys.readouterr().err
+    assert told.startswith(f"score.py: {second}: made by {name} newer instead of {HEAD[name]} in {first}")
+    assert len(told.splitlines()) == 1 and not (tmp_path / "c").exists()
+    del document[name]
+    second.write_text(json.dumps(document))
+    assert main(["--merge", str(first), str(second)], io.StringIO()) == 1
+    assert f"{second}: not a JSON output of score.py, or an older one: {name} is missing" in capsys.readouterr().err
+
+
+HOSTILE = '"><script>alert(1)</script>'
+PICTURES = {
+    **{name: f"pictures/{name}.jpg" for name in ("reference", "distorted", "heat")},
+    "size": [4, 3], "triangles": [2, 1], "texture_bytes": [0, 0], "has_gaps": False, "worst": [],
+}  # fmt: skip
+WORST = {
+    "reference": "pictures/r.jpg",
+    "distorted": "pictures/d.jpg",
+    "FMQM": 0.5,
+    "value": 0.5,
+    "blame": "x",
+    "at": None,
+}
+
+
+def test_pictures_of_a_part_are_taken(tmp_path: Path) -> None:
+    part = write_part(tmp_path, "a", pictures=PICTURES | {"worst": [WORST]})
+    assert main(["--merge", part], io.StringIO()) == 0
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        *({name: HOSTILE} for name in ("FMQM", "stderr", "seconds", "warnings", "fail_under", "patches", "settings")),
+        {"reverse": {"FMQM": HOSTILE}}, {"attribution": {"phrase": HOSTILE}},
+        {"pictures": HOSTILE}, {"id": 7}, {"trust": {"reference": {}, "distorted": {}, "pair": HOSTILE}},
+        *({"pictures": PICTURES | {name: HOSTILE}} for name in PICTURES),
+        *({"pictures": PICTURES | {"heat": path}} for path in ("//host/a.jpg", "../a.jpg", "pictures/../../a.jpg")),
+        {"pictures": PICTURES | {"size": [HOSTILE, 1]}}, {"pictures": PICTURES | {"triangles": [1, 1e308]}},
+        *({"pictures": PICTURES | {"worst": [WORST | {name: 7 if name == "blame" else HOSTILE}]}} for name in WORST),
+    ],
+    ids=str,
+)  # fmt: skip
+def test_a_part_with_text_for_a_number_is_refused_in_one_line(
+    tmp_path: Path, more: dict[str, Any], capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["--merge", write_part(tmp_path, "a", **more), "--junit", str(tmp_path / "x")]
+    assert main(arguments, io.StringIO()) == 1
+    told = capsys.readouterr().err
+    assert "part.json: not a JSON output of score.py, or an older one: pair 1: " in told and len(told.splitlines()) == 1
+    assert not (tmp_path / "x").exists()
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", "NaN", '{"pairs": NaN}', "[" * 100_000, '{"shard": 1e999}', "\xff"])
+def test_what_is_no_part_is_refused_in_one_line(tmp_path: Path, text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "p").write_text(text, encoding="latin-1")
+    assert main(["--merge", str(tmp_path / "p")], io.StringIO()) == 1
+    told = capsys.readouterr().err
+    assert told.startswith(f"score.py: {tmp_path / 'p'}: not a JSON output") and len(told.splitlines()) == 1
+
+
+@pytest.mark.parametrize("shard", [[0, 2], [3, 2], [1], "1/2", [1.0, 2], None])
+def test_a_shard_that_cannot_be_is_refused(tmp_path: Path, shard: object, capsys: pytest.CaptureFixture[str]) -> None:
+    part = Path(write_part(tmp_path, "a"))
+    part.write_text(json.dumps(json.loads(part.read_text()) | {"shard": shard}))
+    assert main(["--merge", str(part)], io.StringIO()) == 1
+    assert "shard is not such as [2, 5]" in capsys.readouterr().err
+
+
+def test_an_id_like_a_formula_goes_through_a_merge(tmp_path: Path) -> None:
+    part = write_part(tmp_path, "=1+1")
+    outputs = ["--csv", str(tmp_path / "c"), "--json", str(tmp_path / "j")]
+    assert main(["--merge", part, *outputs], io.StringIO()) == 0
+    assert json.loads((tmp_path / "j").read_text())["pairs"][0]["id"] == "=1+1"
+    assert (tmp_path / "c").read_text().splitlines()[1].startswith('"\'=1+1",r,')
+    assert main(["--merge", part, *outputs, "--csv-raw"], io.StringIO()) == 0
+    assert (tmp_path / "c").read_text().splitlines()[1].startswith("=1+1,r,")

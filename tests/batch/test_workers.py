@@ -21,7 +21,7 @@ from fmqm_addon.batch.rows import Row, Task
 from fmqm_addon.batch.workers import Command, Limits, adopt, journal_of, score_with_workers, workers_command
 from fmqm_addon.cli.process import WORKER
 from fmqm_addon.metric.errors import FileError, FMQMError
-from fmqm_addon.report.records import PairScore, pair_record
+from fmqm_addon.report.records import SHOWN, PairScore, pair_record
 
 FAKE = Path(__file__).parent / "fake_worker.py"
 ROOT = Path(__file__).resolve().parents[2]
@@ -32,7 +32,8 @@ def tasks_of(*names: str) -> list[Task]:
 
 
 def record(name: str, score: float | None) -> dict[str, Any]:
-    return pair_record(PairScore("r", name, error=None if score else "broken")) | {"FMQM": score}
+    pair = PairScore("r", name, patches=200, error=None if score else "broken")
+    return pair_record(pair) | dict.fromkeys(SHOWN, score)
 
 
 def watch(folder: Path, tasks: list[Task], jobs: int = 2, limits: Limits | None = None, told: str = "") -> Journal:
@@ -197,7 +198,7 @@ PARENT = """
 import sys
 from pathlib import Path
 sys.path.insert(0, sys.argv[1])
-from fmqm_addon.cli.stops import stop_on_signals
+from fmqm_addon.batch.interrupt import stop_on_signals
 from tests.batch.test_workers import tasks_of, watch
 stop_on_signals()  # as score.py
 try:
@@ -230,3 +231,14 @@ def wait_for(condition: object) -> None:
     while not condition():  # type: ignore[operator]
         assert time.monotonic() < end, "it does not come"
         time.sleep(0.05)
+
+
+def test_a_worker_of_other_code_scores_nothing(tmp_path: Path) -> None:
+    """As where the checkout changes while a run goes on."""
+    (tmp_path / "other").touch()
+    journal = watch(tmp_path, tasks_of("fine", "fine"))
+    found = [journal.record(f"k{number}") for number in range(2)]
+    assert {pair["error"] for pair in found} == {
+        "fine: scored by fmqm_code other instead of None; give its host the same"
+    }
+    assert {pair["FMQM"] for pair in found} == {None}

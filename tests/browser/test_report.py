@@ -10,8 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from blender.script import SMALL, noise, score, write_png, write_torus
 from chromium import Page
+
+from tests.blender.script import SMALL, noise, score, write_png, write_torus
 
 pytestmark = [pytest.mark.browser, pytest.mark.once]
 
@@ -64,6 +65,27 @@ def test_names_are_text(page: Page, report: Path) -> None:
     page.open(report, width=1280)
     assert rows(page) == ["shaken.obj", "cut.glb", STRANGE]
     assert page.run("document.querySelectorAll('img[onerror]').length") == 0
+
+
+def test_only_the_pages_own_script_runs(page: Page, report: Path) -> None:
+    """Should something slip through all escaping, the page's policy keeps it from running, and the table sorts."""
+    hostile = (
+        "<script>window.ran = 1</script><img src=x onerror='window.ran = 2'><a href='javascript:window.ran = 3'>x</a>"
+        "<svg onload='window.ran = 4'></svg><script src='data:text/javascript,window.ran=5'></script>"
+        "<base href='https://example.invalid/'><iframe srcdoc='<script>parent.ran = 6</script>'></iframe>"
+    )
+    changed = report.with_name("hostile.html")
+    changed.write_text(report.read_text(encoding="utf-8").replace("<main>", f"<main>{hostile}", 1), encoding="utf-8")
+    page.open(changed, width=1280)
+    page.run("document.querySelector('a[href^=javascript]').click()")
+    page.run("new Promise((done) => setTimeout(done, 300))")
+    assert page.run("typeof window.ran") == "undefined"
+    assert page.run("document.baseURI").startswith("file:")
+    page.click(".scores th:nth-child(2) button")
+    assert rows(page)[0] == "shaken.obj" and page.run("document.querySelectorAll('[aria-sort]').length") == 1
+    refused = [message for message in page.messages if "Content Security Policy" in message]
+    assert len(refused) >= 4
+    page.messages.clear()
 
 
 def test_the_table_is_sorted_by_a_click_and_by_a_key(page: Page, report: Path) -> None:

@@ -33,7 +33,7 @@ def test_only_output_errors_stop_the_run(monkeypatch: pytest.MonkeyPatch, error:
 
     working = scorer._Scorer(Options(Settings()), journal := Journal(), Log("", 2, 1, silent=True), None)
     for name in ("_load", "_tell_memory", "_work"):
-        monkeypatch.setattr(working, name, lambda *_: type("Placed", (), {"world": lambda self: None})())
+        monkeypatch.setattr(working, name, lambda *_: type("AssetMesh", (), {"world": lambda self: None})())
     monkeypatch.setattr(
         "fmqm_addon.comparison.measurement.Measurement", lambda *_: type("M", (), {"prepare": lambda self: None})()
     )

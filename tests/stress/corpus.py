@@ -3,8 +3,8 @@
 
     python -m tests.stress.corpus [FILE or FOLDER ...]
 
-Without arguments: what tests/blender/hostile_files.py makes, and the real files beside the checkout, where there are
-any. A file is well if its score is 1 in every column, or if it is refused in one line that names it.
+Without arguments: what tests/blender/files/hostile_files.py makes, and the real files beside the checkout, where there
+are any. A file is well if its score is 1 in every column, or if it is refused in one line that names it.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from fmqm_addon.blender.files.asset_path import SUFFIXES
-from tests.blender.hostile_files import all_files
+from tests.blender.files.hostile_files import all_files
 from tests.blender.script import COLUMNS, SCORE
 
 ROOT = Path(__file__).resolve().parents[2]

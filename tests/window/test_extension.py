@@ -6,7 +6,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from blender.test_extension import live, package  # noqa: F401  the fixture
+
+from tests.house.test_extension import live, package  # noqa: F401  the fixture
 
 pytestmark = pytest.mark.program
 

@@ -15,7 +15,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from blender.test_extension import package  # noqa: F401  the fixture
+
+from tests.house.test_extension import package  # noqa: F401  the fixture
 
 pytestmark = pytest.mark.program
 Pixels = np.ndarray

@@ -8,7 +8,8 @@ import re
 from pathlib import Path
 
 import pytest
-from blender.script import SCORE, SMALL, noise, numbers, read_json, score, write_png, write_torus
+
+from tests.blender.script import SCORE, SMALL, noise, numbers, read_json, score, write_png, write_torus
 
 pytestmark = pytest.mark.program
 ONE_BLENDER = 1e-9  # the same release, another build and numpy

@@ -18,10 +18,11 @@ from ...metric.errors import MeshError
 from ...metric.geometry import Floats
 from ...metric.surface import triangle_areas
 from ...metric.texture import Material, Texture
+from .. import arrays
 from ..materials.expressions import ImageAlpha, Opacity
-from ..materials.types import Layer, Look, Unread
+from ..materials.types import Look, MeshLayer, Unread
 from .atlas import LARGEST, Layout, new_layout, own_layout
-from .emission import Shine, is_opaque, shining
+from .emission import BakePass, emission_copy, is_opaque
 
 _MARGIN = 8  # pixels around the parts of an own UV map, for bilinear lookups at their edges
 _ROWS = 256  # of an image that are worked on at a time
@@ -110,7 +111,7 @@ def _bake(
     temporary.callback(bpy.data.meshes.remove, source)
     vertices = np.nan_to_num(_values(source.attributes["position"]).astype(np.float64), posinf=0, neginf=0)
     parts = []
-    slot = _read(source.polygons, "material_index", 1, np.int32).ravel()[_polygons(source)]
+    slot = arrays.read(source.polygons, "material_index", 1, np.int32).ravel()[_polygons(source)]
     for index in slots:
         rows = np.flatnonzero(slot == index)
         if rows.size:
@@ -126,9 +127,9 @@ def _bake(
     scene.collection.objects.link(stand_in)
     numbers = _numbers(mesh)
 
-    def draw(shine: Shine) -> list[NDArray[np.float32]]:
+    def draw(bake_pass: BakePass) -> list[NDArray[np.float32]]:
         for index, part in enumerate(parts):
-            material = shining(slots[part.slot][0].original, shine, numbers, temporary)
+            material = emission_copy(slots[part.slot][0].original, bake_pass, numbers, temporary)
             target = material.node_tree.nodes.new("ShaderNodeTexImage")
             target.image = part.image
             material.node_tree.nodes.active = target
@@ -136,9 +137,9 @@ def _bake(
         _run(scene, stand_in, uv_map)
         return [_pixels(part.image) for part in parts]
 
-    colors = draw(Shine.COLOR)
+    colors = draw(BakePass.COLOR)
     opaque = all(is_opaque(slots[part.slot][0].node_tree) for part in parts)
-    weights = [None] * len(parts) if opaque else draw(Shine.WEIGHT)
+    weights = [None] * len(parts) if opaque else draw(BakePass.WEIGHT)
     return {
         part.slot: Baked(_look(*slots[part.slot], part.layout, color, weight), part.layout.corners)
         for part, color, weight in zip(parts, colors, weights, strict=True)
@@ -177,7 +178,7 @@ def _stand_in(object_: bpy.types.Object, mesh: bpy.types.Mesh, temporary: ExitSt
     copy_properties(object_.data, mesh)
     modeled = object_.original.data
     if isinstance(modeled, bpy.types.Mesh) and len(modeled.vertices) == len(mesh.vertices):
-        _bend(made, _read(modeled.vertices, "co", 3, np.float32), temporary)
+        _bend(made, arrays.read(modeled.vertices, "co", 3, np.float32), temporary)
     return made
 
 
@@ -219,7 +220,7 @@ def _look(
     """The drawn images as samplers.
 
     Args:
-        colors, weights: (H, W, 4), row 0 at v = 0, see _pixels and Shine; colors is overwritten. None: 1 everywhere.
+        colors, weights: (H, W, 4), row 0 at v = 0, see _pixels and BakePass; colors is overwritten. None: 1 all over.
     """
     opaque = weights is None or weights[:, :, 1].min(initial=1, where=weights[:, :, 3] > 0) >= _OPAQUE
     for rows in (slice(first, first + _ROWS) for first in range(0, layout.side, _ROWS)):
@@ -238,7 +239,7 @@ def _look(
         uv=0 if layout.own else None,
     )
     warning = f"material {material.name}: {unread.node} {unread.why}; baked at {layout.side} x {layout.side}"
-    return Look(made, (Layer("uv", ""),), (warning, *unread.warnings))
+    return Look(made, (MeshLayer("uv", ""),), (warning, *unread.warnings))
 
 
 def _encode(colors: NDArray[np.float32], weights: NDArray[np.float32] | None) -> None:
@@ -262,8 +263,8 @@ def _layout(mesh: bpy.types.Mesh, vertices: Floats, matrix: Floats, rows: NDArra
         if own is not None:
             return own
     polygon = _polygons(mesh)[rows]
-    first = _read(mesh.polygons, "loop_start", 1, np.int32).ravel()[polygon]
-    total = _read(mesh.polygons, "loop_total", 1, np.int32).ravel()[polygon]
+    first = arrays.read(mesh.polygons, "loop_start", 1, np.int32).ravel()[polygon]
+    total = arrays.read(mesh.polygons, "loop_total", 1, np.int32).ravel()[polygon]
     return new_layout(world, triangles, loops - first[:, None], np.where(total == 4, polygon, -1), size)
 
 
@@ -277,16 +278,13 @@ def _triangles(source: bpy.types.Mesh, parts: list[_Part], temporary: ExitStack)
     mesh = bpy.data.meshes.new("FMQM bake")
     temporary.callback(bpy.data.meshes.remove, mesh)
     mesh.vertices.add(len(source.vertices))
-    mesh.loops.add(triangles.size)
-    mesh.attributes[".corner_vert"].data.foreach_set("value", triangles.ravel())
-    mesh.polygons.add(len(triangles))
-    mesh.polygons.foreach_set("loop_start", np.arange(0, triangles.size, 3, dtype=np.int32))
+    arrays.add_triangles(mesh, triangles)
     for attribute in source.attributes:
         if attribute.name[0] != "." and attribute.domain in kept and attribute.data_type in _VALUES:
             _store(
                 mesh, attribute.name, attribute.data_type, attribute.domain, _values(attribute)[kept[attribute.domain]]
             )
-    normals = _read(source.corner_normals, "vector", 3, np.float32)[loops]
+    normals = arrays.read(source.corner_normals, "vector", 3, np.float32)[loops]
     _store(mesh, "custom_normal", "FLOAT_VECTOR", "CORNER", normals)
     _store(mesh, "material_index", "INT", "FACE", np.repeat(np.arange(len(parts)), [len(part.rows) for part in parts]))
     for layer in source.uv_layers:
@@ -298,7 +296,7 @@ def _triangles(source: bpy.types.Mesh, parts: list[_Part], temporary: ExitStack)
     for _ in parts:
         mesh.materials.append(None)
     target = mesh.attributes.new("FMQM bake", "FLOAT2", "CORNER")
-    target.data.foreach_set("vector", np.concatenate([part.layout.drawn for part in parts]).ravel())
+    arrays.write(target.data, "vector", np.concatenate([part.layout.drawn for part in parts]))
     name = target.name
     mesh.uv_layers.active = mesh.uv_layers[name]  # the baker wants one, though it is told which
     mesh.update(calc_edges=True)
@@ -317,42 +315,33 @@ def _bend(object_: bpy.types.Object, at_rest: NDArray[np.float32], temporary: Ex
     bent = _values(position)
     if np.array_equal(bent, at_rest):
         return
-    position.data.foreach_set("vector", at_rest.ravel())
+    arrays.write(position.data, "vector", at_rest)
     temporary.callback(object_.shape_key_clear)
     object_.shape_key_add(name="At rest")
     key = object_.shape_key_add(name="Bent")
-    key.data.foreach_set("co", bent.ravel())
+    arrays.write(key.data, "co", bent)
     key.value = 1
 
 
 def _store(mesh: bpy.types.Mesh, name: str, data_type: str, domain: str, values: NDArray[Any]) -> None:
     attribute = mesh.attributes.get(name) or mesh.attributes.new(name, data_type, domain)
-    attribute.data.foreach_set(_VALUES[data_type][0], np.ascontiguousarray(values).ravel())
+    arrays.write(attribute.data, _VALUES[data_type][0], values)
 
 
 def _values(attribute: bpy.types.Attribute) -> NDArray[Any]:
     """(N, channels)"""
-    return _read(attribute.data, *_VALUES[attribute.data_type])
+    return arrays.read(attribute.data, *_VALUES[attribute.data_type])
 
 
 def _polygons(mesh: bpy.types.Mesh) -> NDArray[Any]:
-    return _read(mesh.loop_triangles, "polygon_index", 1, np.int32).ravel()
+    return arrays.read(mesh.loop_triangles, "polygon_index", 1, np.int32).ravel()
 
 
 def _loop_triangles(mesh: bpy.types.Mesh, what: str) -> NDArray[Any]:
-    return _read(mesh.loop_triangles, what, 3, np.int32)
+    return arrays.read(mesh.loop_triangles, what, 3, np.int32)
 
 
 def _pixels(image: bpy.types.Image) -> NDArray[np.float32]:
     """(H, W, 4) linear, row 0 at v = 0, the fourth 0 where nothing was drawn; what is not a number is 0."""
     width, height = image.size
-    values = np.empty(width * height * 4, np.float32)
-    image.pixels.foreach_get(values)
-    return np.nan_to_num(values, copy=False).reshape(height, width, 4)
-
-
-def _read(collection: Any, name: str, channels: int, dtype: type) -> NDArray[Any]:
-    """(N, channels) of a collection of Blender's."""
-    values: NDArray[Any] = np.empty((len(collection), channels), dtype)
-    collection.foreach_get(name, values.reshape(-1))
-    return values
+    return np.nan_to_num(arrays.read_pixels(image), copy=False).reshape(height, width, 4)

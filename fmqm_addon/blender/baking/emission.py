@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Temporary copies of materials that shine in their base color: what a baker can draw without light."""
+"""Temporary copies of materials that emit their base color: what a baker can draw without light."""
 
 from __future__ import annotations
 
@@ -11,18 +11,17 @@ from enum import Enum
 import bpy
 
 from ..materials.cycles_alpha import divided
-from ..materials.node_graph import active_output, only_shines
+from ..materials.node_graph import TRANSPARENT, active_output, color_of, only_emits
 
 # Mixing never hides one of its shaders wholly: what a transparent one covers still has a color.
 _LEAST_SHARE = 1e-4
 _NEXT_TO_NOTHING = 1e-7
 _KEPT = {"MIX_SHADER", "ADD_SHADER", "GROUP", "GROUP_INPUT", "REROUTE"}
-_TRANSPARENT = {"BSDF_TRANSPARENT", "HOLDOUT"}
 
 
-class Shine(Enum):
-    """What a copy shines in: its base color, black where a transparent shader is; or red as far as its shader is
-    not a transparent one, green as far as it is opaque in all."""
+class BakePass(Enum):
+    """What a copy emits: its base color, black where a transparent shader is; or red as far as its shader is not a
+    transparent one, green as far as it is opaque in all."""
 
     COLOR = 1
     WEIGHT = 2
@@ -33,13 +32,13 @@ class _Task:
     """What a copy becomes.
 
     Attributes:
-        numbers: see shining.
+        numbers: see emission_copy.
         divided: pointers of the original image nodes whose color Cycles divides by their alpha.
         groups: the copies made so far, by the full name of what they copy.
         temporary: removes them.
     """
 
-    shine: Shine
+    bake_pass: BakePass
     numbers: Collection[str]
     divided: Collection[int]
     groups: dict[str, bpy.types.NodeTree]
@@ -53,7 +52,7 @@ def is_opaque(tree: bpy.types.NodeTree) -> bool:
 
 def _lets_through(node: bpy.types.Node) -> bool:
     alpha = node.inputs.get("Alpha") if any(socket.type == "SHADER" for socket in node.outputs) else None
-    return node.type in _TRANSPARENT or (alpha is not None and (alpha.is_linked or alpha.default_value < 1))
+    return node.type in TRANSPARENT or (alpha is not None and (alpha.is_linked or alpha.default_value < 1))
 
 
 def _with_groups(tree: bpy.types.NodeTree) -> list[bpy.types.NodeTree]:
@@ -65,8 +64,8 @@ def _with_groups(tree: bpy.types.NodeTree) -> list[bpy.types.NodeTree]:
     return trees
 
 
-def shining(
-    material: bpy.types.Material, shine: Shine, numbers: Collection[str], temporary: ExitStack
+def emission_copy(
+    material: bpy.types.Material, bake_pass: BakePass, numbers: Collection[str], temporary: ExitStack
 ) -> bpy.types.Material:
     """A copy of a material whose shaders, in its node groups too, are emissions; mixes of them stay.
 
@@ -88,7 +87,7 @@ def shining(
             for link in list(output.inputs[name].links):
                 tree.links.remove(link)
     pointers = {place.node.as_pointer() for place in divided(material)}
-    _convert(tree, material.node_tree, _Task(shine, numbers, pointers, {}, temporary))
+    _convert(tree, material.node_tree, _Task(bake_pass, numbers, pointers, {}, temporary))
     return copy
 
 
@@ -101,13 +100,13 @@ def _convert(tree: bpy.types.NodeTree, original: bpy.types.NodeTree, task: _Task
         if node.as_pointer() in task.divided:
             _use_alpha(tree, tree.nodes[node.name])
     for link in list(tree.links):
-        # A color at a shader's place shines by itself.
+        # A color at a shader's place emits by itself.
         if link.to_socket.type == "SHADER" and link.from_socket.type != "SHADER":
             _emission(tree, link.from_socket, [link.to_socket])
     for node in list(tree.nodes):
         if node.type == "SHADERTORGB":
             _pass_color(tree, node)
-    kept = _KEPT | {"EMISSION"} if task.shine is Shine.COLOR else _KEPT
+    kept = _KEPT | {"EMISSION"} if task.bake_pass is BakePass.COLOR else _KEPT
     for node in list(tree.nodes):
         if node.mute:
             continue
@@ -119,7 +118,7 @@ def _convert(tree: bpy.types.NodeTree, original: bpy.types.NodeTree, task: _Task
         elif node.type == "MIX_SHADER":
             _clamp(tree, node.inputs[0], node.inputs[0], _LEAST_SHARE, 1 - _LEAST_SHARE)
         elif shader is not None and node.type not in kept:
-            _replace(tree, node, shader, task.shine)
+            _replace(tree, node, shader, task.bake_pass)
 
 
 def _group(tree: bpy.types.NodeTree, task: _Task) -> bpy.types.NodeTree:
@@ -153,15 +152,6 @@ def _pass_color(tree: bpy.types.NodeTree, node: bpy.types.Node) -> None:
         tree.links.new(passed.outputs[0], each.to_socket)
 
 
-def color_of(shader: bpy.types.Node) -> bpy.types.NodeSocket | None:
-    """The input that is a shader's base color; None if it has none or lets all light through."""
-    if shader.type in _TRANSPARENT:
-        return None
-    if only_shines(shader):
-        return shader.inputs["Emission Color"]
-    return shader.inputs.get("Base Color") or shader.inputs.get("Color")
-
-
 def _clamp(
     tree: bpy.types.NodeTree, old: bpy.types.NodeSocket, new: bpy.types.NodeSocket, least: float, most: float
 ) -> None:
@@ -172,18 +162,18 @@ def _clamp(
     tree.links.new(clamp.outputs[0], new)
 
 
-def _replace(tree: bpy.types.NodeTree, node: bpy.types.Node, output: bpy.types.NodeSocket, shine: Shine) -> None:
+def _replace(tree: bpy.types.NodeTree, node: bpy.types.Node, output: bpy.types.NodeSocket, bake_pass: BakePass) -> None:
     targets = [link.to_socket for link in output.links]
     color = _emission(tree, None, targets)
-    if shine is Shine.COLOR:
+    if bake_pass is BakePass.COLOR:
         wanted = color_of(node)
         if wanted is not None:
             _take_over(tree, wanted, color)
-        if only_shines(node):
+        if only_emits(node):
             _take_over(tree, node.inputs["Emission Strength"], color.node.inputs["Strength"])
         if "Alpha" in node.inputs and node.inputs["Alpha"].is_linked:
             _keep_in_use(tree, node.inputs["Alpha"].links[0].from_socket, color.node.inputs["Strength"])
-    elif node.type not in _TRANSPARENT:
+    elif node.type not in TRANSPARENT:
         weights = tree.nodes.new("ShaderNodeCombineColor")
         tree.links.new(weights.outputs[0], color)
         weights.inputs["Red"].default_value = weights.inputs["Green"].default_value = 1

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ...metric.colorspace import decode_srgb
 from ...metric.geometry import Floats, Ints
+from .. import arrays
 
 TAG = "fmqm"  # custom property of every data-block of ours: what it is for
 COLLECTION = "FMQM"
@@ -74,7 +75,7 @@ def recolor(object_: bpy.types.Object, colors: Floats) -> None:
     repeat, rest = divmod(len(mesh.vertices), len(colors))
     if rest:
         raise ValueError(f"{len(colors)} colors do not fit the {len(mesh.vertices)} vertices of {object_.name}")
-    mesh.attributes[COLOR].data.foreach_set("color", np.repeat(linear, repeat, axis=0).ravel())
+    arrays.write(mesh.attributes[COLOR].data, "color", np.repeat(linear, repeat, axis=0))
     mesh.update()
 
 
@@ -85,13 +86,12 @@ def resize(object_: bpy.types.Object, size: float, shown: NDArray[np.bool_] | No
         size: in the cloud's own units. shown: (N,) the other points shrink to nothing; None keeps which.
     """
     mesh: bpy.types.Mesh = object_.data
-    corners = np.empty((len(mesh.vertices) // 4, 4, 3), np.float32)
-    mesh.attributes["position"].data.foreach_get("vector", corners.reshape(-1))  # vertices.co is slower
+    corners = arrays.read_attribute(mesh, "position", "vector", 3, np.float32).reshape(-1, 4, 3)
     if shown is None:
         shown = (corners[:, 0] != corners[:, 1]).any(axis=1)
     centers = corners.mean(axis=1, keepdims=True)
     corners = centers + np.where(shown, np.float32(size), np.float32(0))[:, None, None] * _CORNERS
-    mesh.attributes["position"].data.foreach_set("vector", corners.ravel())
+    arrays.write(mesh.attributes["position"].data, "vector", corners)
     mesh.update()
 
 
@@ -122,7 +122,7 @@ def draw_slice(object_: bpy.types.Object, colors: Floats) -> None:
     """Writes (resolution^2, 3) encoded colors, rows upwards, into the image of a slice."""
     pixels = np.ones((len(colors), 4), np.float32)
     pixels[:, :3] = colors
-    object_.data.pixels.foreach_set(pixels.ravel())
+    arrays.write_pixels(object_.data, pixels)
     object_.data.update()
     object_.data.pack()  # else it is black when the file is opened again
 
@@ -213,19 +213,16 @@ def _cloud_mesh(name: str, positions: Floats, normals: Floats, size: float) -> b
     first = 4 * np.arange(len(positions), dtype=np.int32)
     mesh = _mesh(name, vertices.reshape(-1, 3), (first[:, None, None] + _FACES).reshape(-1, 3))
     normal = mesh.attributes.new("custom_normal", "FLOAT_VECTOR", "POINT")
-    normal.data.foreach_set("vector", np.repeat(normals.astype(np.float32), 4, axis=0).ravel())
+    arrays.write(normal.data, "vector", np.repeat(normals.astype(np.float32), 4, axis=0))
     return mesh
 
 
 def _mesh(name: str, vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> bpy.types.Mesh:
-    """A smooth mesh with a white color attribute; foreach_set is the only quick way."""
+    """A smooth mesh with a white color attribute."""
     mesh = bpy.data.meshes.new(name)
     mesh.vertices.add(len(vertices))
-    mesh.attributes["position"].data.foreach_set("vector", vertices.ravel())
-    mesh.loops.add(triangles.size)
-    mesh.loops.foreach_set("vertex_index", triangles.ravel())
-    mesh.polygons.add(len(triangles))
-    mesh.polygons.foreach_set("loop_start", np.arange(0, triangles.size, 3, dtype=np.int32))
+    arrays.write(mesh.attributes["position"].data, "vector", vertices)
+    arrays.add_triangles(mesh, triangles)
     mesh.color_attributes.new(COLOR, "FLOAT_COLOR", "POINT")
     mesh.color_attributes.active_color_index = 0
     mesh.color_attributes.render_color_index = 0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files with fewer triangles and smaller textures: opened, reduced, exported. For scripts: they replace the session."""
+"""Files with fewer triangles and smaller textures: opened, decimated, saved. For scripts: the session is replaced."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ from pathlib import Path
 
 import bpy
 
+from ...comparison.decimation import Version, VersionReader
 from ...folders import own_folder, take_place
 from ...metric.errors import FileError, FMQMError, MeshError, SettingsError
 from ...metric.surface import MeshArrays
 from ..materials.types import Reading
-from ..scene.decimate import Reader, Version, add_modifiers, scene_reader
+from ..scene.decimate import add_modifiers, scene_reader
 from ..scene.members import instanced, scene_members
 from ..scene.mesh_arrays import AS_FOUND
 from .asset_path import split_spec
-from .flatten import ancestors, make_plain
+from .flatten import ancestors, flatten_objects
 from .load import last_line, load_mesh, open_file
 from .loaded import mute_imports
 
@@ -29,7 +30,7 @@ _ENDINGS = {"JPEG": ".jpg", "TARGA": ".tga", "TARGA_RAW": ".tga", "OPEN_EXR": ".
 
 
 def open_asset(spec: str, reading: Reading = AS_FOUND) -> list[bpy.types.Object]:
-    """Opens a file, as files.load_placed names it, and leaves it open; the objects that are measured.
+    """Opens a file, as files.load_asset names it, and leaves it open; the objects that are measured.
 
     Raises:
         FileError: it cannot be opened, or has no such object.
@@ -47,7 +48,7 @@ def open_asset(spec: str, reading: Reading = AS_FOUND) -> list[bpy.types.Object]
     return objects
 
 
-def file_reader(spec: str, reading: Reading = AS_FOUND) -> Reader:
+def file_reader(spec: str, reading: Reading = AS_FOUND) -> VersionReader:
     """Reads versions of a file; textures cannot grow again, so that another size opens the file again."""
     names: list[str] = []
     opened: int | None = -1
@@ -77,7 +78,7 @@ def texture_sizes(spec: str, reading: Reading = AS_FOUND) -> list[int]:
 
 
 def shrink_textures(objects: list[bpy.types.Object], size: int | None) -> None:
-    """Color images whose longest side exceeds size are scaled down to it, in place, and packed.
+    """Scales color images whose longest side exceeds size down to it, in place, and packs them.
 
     Images of other data (normals, roughness) are left alone: the metric does not see what that would do.
     """
@@ -91,7 +92,7 @@ def shrink_textures(objects: list[bpy.types.Object], size: int | None) -> None:
             image.pack()
 
 
-def written_reader(spec: str, path: str, reading: Reading = AS_FOUND) -> Reader:
+def written_reader(spec: str, path: str, reading: Reading = AS_FOUND) -> VersionReader:
     """Reads versions of a file as save_version writes them to path, from files beside it that do not stay."""
 
     def read(version: Version) -> MeshArrays:
@@ -104,7 +105,7 @@ def written_reader(spec: str, path: str, reading: Reading = AS_FOUND) -> Reader:
 
 
 def save_version(spec: str, version: Version, path: str, reading: Reading = AS_FOUND) -> tuple[str, ...]:
-    """Opens a file, reduces what is measured of it, and saves that; a .blend keeps the whole scene, the modifiers live.
+    """Opens a file, decimates what is measured of it, and saves that; a .blend keeps its scene, the modifiers live.
 
     Returns:
         What should be known of the written file.
@@ -174,7 +175,7 @@ _NAMING_IMAGES = (".obj", ".fbx", ".usd")  # their exporters want files of the i
 def _export(
     spec: str, version: Version, path: str, written: Path, reading: Reading
 ) -> tuple[tuple[str, ...], list[str]]:
-    """Opens and reduces a file, and writes it, with the files that it names beside it.
+    """Opens and decimates a file, and writes it, with the files that it names beside it.
 
     Args:
         path: what errors call it.
@@ -192,7 +193,7 @@ def _export(
     if suffix != ".blend":
         if any(map(_moves, objects)):
             warnings = (f"{path}: it holds the pose as it stands, no skeleton, shape keys or animation; a .blend does",)
-        objects = make_plain(objects, alone)
+        objects = flatten_objects(objects, alone)
     elif alone:
         _leave_only(objects[0])
     with own_folder() as images:

@@ -41,7 +41,7 @@ class _Surface:
     own: bool
 
 
-def make_plain(objects: Sequence[bpy.types.Object], alone: bool) -> list[bpy.types.Object]:
+def flatten_objects(objects: Sequence[bpy.types.Object], alone: bool) -> list[bpy.types.Object]:
     """Replaces all objects of the session by what these show, as it is measured: evaluated meshes, without modifiers,
     skeletons, shape keys, constraints and animation, under their names and parents; instances are objects of their own.
 
@@ -65,7 +65,7 @@ def make_plain(objects: Sequence[bpy.types.Object], alone: bool) -> list[bpy.typ
 
 
 def ancestors(object_: bpy.types.Object) -> list[bpy.types.Object]:
-    """Its parent, the parent of that and so on."""
+    """An object's parent, the parent of that and so on."""
     above = []
     while object_.parent is not None:
         object_ = object_.parent

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import bpy
 
-from ...comparison.alignment import Placed
+from ...comparison.alignment import AssetMesh
 from ...metric.errors import FileError, FMQMError, MeshError, one_line
 from ...metric.surface import MeshArrays
 from ..access import check_asset
@@ -22,7 +22,7 @@ from ..materials.types import Reading
 from ..scene.lods import find_chains
 from ..scene.members import check_instances, check_object, scene_members
 from ..scene.mesh_arrays import AS_FOUND, to_bake
-from ..scene.target import placed
+from ..scene.target import asset_mesh
 from .asset_path import SUFFIXES, split_spec
 from .import_warnings import left_out
 from .loaded import before_evaluation, check_loaded, mute_imports
@@ -32,11 +32,11 @@ from .preflight_file import check_file
 
 
 def load_mesh(spec: str, reading: Reading = AS_FOUND) -> MeshArrays:
-    """The asset in a file as one mesh in its world frame; as load_placed."""
-    return load_placed(spec, reading).world()
+    """The asset in a file as one mesh in its world frame; as load_asset."""
+    return load_asset(spec, reading).world()
 
 
-def load_placed(spec: str, reading: Reading = AS_FOUND, announce: Callable[[str], None] = lambda _: None) -> Placed:
+def load_asset(spec: str, reading: Reading = AS_FOUND, announce: Callable[[str], None] = lambda _: None) -> AssetMesh:
     """The asset in a file as one mesh, with its place; nothing stays in the session.
 
     Args:
@@ -53,7 +53,7 @@ def load_placed(spec: str, reading: Reading = AS_FOUND, announce: Callable[[str]
     try:
         unresolved = open_file(path, reading)
         objects = [_named(object_name, path)] if object_name else scene_members()
-        remarks = (*unresolved, *left_out(path, reading.texture is None))
+        omissions = (*unresolved, *left_out(path, reading.texture is None))
         name, cache = object_name or Path(path).name, TextureCache()
         try:
             if not objects:
@@ -62,11 +62,11 @@ def load_placed(spec: str, reading: Reading = AS_FOUND, announce: Callable[[str]
             baked = to_bake(objects, reading, cache)
             if baked:
                 announce(f"baking {', '.join(baked)} (materials of {name})")
-            found = placed(objects, name, reading, cache=cache)
+            found = asset_mesh(objects, name, reading, cache=cache)
         except FMQMError as error:
-            why = f" ({'; '.join(remarks)})" if remarks else ""
+            why = f" ({'; '.join(omissions)})" if omissions else ""
             raise type(error)(f"{spec}: {str(error).removeprefix(f'{name}: ')}{why}") from error
-        warnings = tuple(one_line(f"{Path(path).name}: {remark}") for remark in remarks)
+        warnings = tuple(one_line(f"{Path(path).name}: {omission}") for omission in omissions)
         return replace(found, mesh=replace(found.mesh, warnings=(*warnings, *found.mesh.warnings)))
     finally:
         _clear_session()
@@ -218,7 +218,7 @@ def _named(name: str, path: str) -> bpy.types.Object:
 
 
 def last_line(error: RuntimeError, program: str = "the importer") -> str:
-    """Operators put a report, or a whole traceback, into the error; its last line says what happened."""
+    """What happened: the last line of the report, or of the whole traceback, that an operator put into its error."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip() and not line.startswith("Location:")]
     if not lines:
         return f"{program} failed without saying why"

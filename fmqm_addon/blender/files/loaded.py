@@ -11,7 +11,7 @@ import bpy
 
 from ...metric.errors import FileError, FMQMError
 from ..access import Access, check_folder, check_named
-from ..materials.images import check_limits, image_path
+from ..materials.image_files import check_limits, image_path
 from ..materials.types import Reading
 from ..scene.shaping import check_memory
 

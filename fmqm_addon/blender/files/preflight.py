@@ -14,8 +14,8 @@ import numpy as np
 
 from ...metric.errors import FileError
 from ..limits import MAX_DEPTH
+from ..materials.image_files import crashes
 from ..materials.image_headers import file_header
-from ..materials.images import crashes
 
 _COUNT = re.compile(rb"-?0*\d{1,9}")  # Blender would end the process at 2^31
 _OGAWA_DATA = 1 << 63  # marks the position of data, not of a group

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import bpy
 
-from .images import same_content
-from .node_graph import NotReadError, Place, family, outputs, source, upstream_outputs
+from .image_files import same_content
+from .node_graph import NestedSocket, NotReadError, family, outputs, source, upstream_outputs
 
 # Of the kinds of nodes that images' vectors are read from: the settings that make two of them unlike.
 _SETTINGS = {
@@ -31,14 +31,14 @@ _LOBES = {
 }
 
 
-def used_alphas(material: bpy.types.Material) -> list[Place]:
+def used_alphas(material: bpy.types.Material) -> list[NestedSocket]:
     """The alpha outputs of image nodes that Cycles uses for anything."""
     starts = outputs(material, ("Surface", "Volume", "Displacement"))
     used = dict.fromkeys(place for start in starts for place, _ in upstream_outputs(start, _dropped))
     return [place for place in used if place.node.type == "TEX_IMAGE" and place.socket.name == "Alpha"]
 
 
-def divided(material: bpy.types.Material) -> list[Place]:
+def divided(material: bpy.types.Material) -> list[NestedSocket]:
     """The color outputs of image nodes, of those that feed the surface, that Cycles divides by their alpha."""
     alphas = used_alphas(material)
     beside = {(place.node, place.groups) for place in alphas}
@@ -56,7 +56,7 @@ def divided(material: bpy.types.Material) -> list[Place]:
     ]
 
 
-def merged(one: Place, other: Place) -> bool:
+def merged(one: NestedSocket, other: NestedSocket) -> bool:
     """Whether Cycles makes one node of those of two outputs, having equal settings and inputs, whatever image they
     show. Their place in the trees does not matter."""
     first, second = one.node, other.node
@@ -66,7 +66,7 @@ def merged(one: Place, other: Place) -> bool:
     if any(getattr(first, name) != getattr(second, name) for name in names) or _mapping(first) != _mapping(second):
         return False
     pairs = zip(first.inputs, second.inputs, strict=True)
-    return all(_same(Place(mine, one.groups), Place(its, other.groups)) for mine, its in pairs)
+    return all(_same(NestedSocket(mine, one.groups), NestedSocket(its, other.groups)) for mine, its in pairs)
 
 
 def _mapping(node: bpy.types.Node) -> list[object]:
@@ -78,7 +78,7 @@ def _mapping(node: bpy.types.Node) -> list[object]:
     return [tuple(value) if hasattr(value, "__len__") else value for value in values]
 
 
-def _same(one: Place, other: Place) -> bool:
+def _same(one: NestedSocket, other: NestedSocket) -> bool:
     """Whether two inputs are fed by the same, in Cycles' eyes."""
     try:
         one, other = _folded(source(one)), _folded(source(other))
@@ -92,7 +92,7 @@ def _same(one: Place, other: Place) -> bool:
     return one.socket.identifier == other.socket.identifier and (one == other or merged(one, other))
 
 
-def _folded(place: Place) -> Place:
+def _folded(place: NestedSocket) -> NestedSocket:
     """What is left of a Mapping node that does nothing: what it maps."""
     while place.socket.is_output and place.node.type == "MAPPING":
         still = {"Rotation": (0, 0, 0), "Scale": (1, 1, 1)}
@@ -104,7 +104,7 @@ def _folded(place: Place) -> Place:
     return place
 
 
-def _is_own_uv(place: Place) -> bool:
+def _is_own_uv(place: NestedSocket) -> bool:
     """Whether a place is the UV map that images have without a vector."""
     node = place.node
     if not place.socket.is_output:
@@ -112,7 +112,7 @@ def _is_own_uv(place: Place) -> bool:
     return node.type == "TEX_COORD" and place.socket.name == "UV" and not (node.from_instancer or node.object)
 
 
-def _constant(place: Place) -> tuple[float, ...] | None:
+def _constant(place: NestedSocket) -> tuple[float, ...] | None:
     """The value of a socket where nothing varies it."""
     if place.socket.is_output and place.node.type not in {"RGB", "VALUE"}:
         return None
@@ -120,14 +120,14 @@ def _constant(place: Place) -> tuple[float, ...] | None:
     return tuple(value) if family(place.socket) == "VECTOR" else (value,)
 
 
-def _dropped(place: Place) -> list[bpy.types.NodeSocket]:
+def _dropped(place: NestedSocket) -> list[bpy.types.NodeSocket]:
     """The inputs of an output's node that Cycles cuts off, since a constant leaves nothing of them."""
     node = place.node
     inputs = node.inputs
 
     def is_(socket: bpy.types.NodeSocket, number: float) -> bool:
         try:
-            return _constant(source(Place(socket, place.groups))) == (number,)
+            return _constant(source(NestedSocket(socket, place.groups))) == (number,)
         except NotReadError:
             return False
 
@@ -144,7 +144,7 @@ def _dropped(place: Place) -> list[bpy.types.NodeSocket]:
     return []
 
 
-def _idle_lobes(place: Place) -> list[bpy.types.NodeSocket]:
+def _idle_lobes(place: NestedSocket) -> list[bpy.types.NodeSocket]:
     """The inputs of a Principled BSDF that its own weights leave out."""
 
     def is_nothing(name: str) -> bool:

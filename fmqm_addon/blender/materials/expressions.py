@@ -5,13 +5,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import isfinite
 from typing import Literal, Protocol
 
 import numpy as np
 
 from ...metric.colorspace import encode_srgb
 from ...metric.geometry import Floats
-from ...metric.texture import Texture, Tiles
+from ...metric.texture import PlainColor, Texture, Tiles
+
+BRIGHTEST = 1e6  # linear light is kept within this, so that nothing made of it overflows
+LUMINANCE = (0.2126729, 0.7151522, 0.0721750)  # a color where a number is wanted
+AVERAGE = (1 / 3, 1 / 3, 1 / 3)  # a vector where a number is wanted
+CHANNELS = {"Red": (1.0, 0.0, 0.0), "Green": (0.0, 1.0, 0.0), "Blue": (0.0, 0.0, 1.0)} | {
+    "X": (1.0, 0.0, 0.0),
+    "Y": (0.0, 1.0, 0.0),
+    "Z": (0.0, 0.0, 1.0),
+}
 
 
 class Light(Protocol):
@@ -152,6 +162,16 @@ class ImageAlpha:
 
 
 Operation = Literal["add", "subtract", "multiply", "less", "greater", "round", "minimum", "maximum"]
+OPERATIONS: dict[str, Operation] = {  # of Math nodes
+    "ADD": "add",
+    "SUBTRACT": "subtract",
+    "MULTIPLY": "multiply",
+    "LESS_THAN": "less",
+    "GREATER_THAN": "greater",
+    "ROUND": "round",
+    "MINIMUM": "minimum",
+    "MAXIMUM": "maximum",
+}
 
 
 @dataclass(frozen=True)
@@ -182,3 +202,54 @@ _OPERATIONS: dict[Operation, Callable[[Floats, Floats], Floats]] = {
     "minimum": np.minimum,
     "maximum": np.maximum,
 }
+
+
+def plain_color(linear: tuple[float, ...]) -> PlainColor:
+    """A linear color as a material has it, encoded."""
+    red, green, blue = encode_srgb(np.array([finite(x) for x in linear])).tolist()
+    return PlainColor((red, green, blue))
+
+
+def finite(number: float) -> float:
+    """Sockets take any float; what is made of them must stay finite."""
+    return min(max(number, -BRIGHTEST), BRIGHTEST) if isfinite(number) else 0.0
+
+
+_NOWHERE: Floats = np.zeros((1, 0))
+
+
+def evaluated(light: Light) -> PlainLight:
+    """The color of a constant light."""
+    red, green, blue = light.light_at(_NOWHERE)[0].tolist()
+    return PlainLight((finite(red), finite(green), finite(blue)))
+
+
+def scaled(light: Light, scale: tuple[float, ...], bias: tuple[float, ...]) -> Light:
+    """A light times a scale plus a bias, channel by channel."""
+    if scale == (1.0, 1.0, 1.0) and bias == (0.0, 0.0, 0.0):
+        return light
+    scaled = Scaled(light, (scale[0], scale[1], scale[2]), (bias[0], bias[1], bias[2]))
+    return evaluated(scaled) if isinstance(light, PlainLight) else scaled
+
+
+def weighted(light: Light, weights: tuple[float, float, float]) -> Value:
+    """The weighted sum of a light's channels."""
+    weighted = Weighted(light, weights)
+    return Constant(float(weighted.value_at(_NOWHERE)[0])) if isinstance(light, PlainLight) else weighted
+
+
+def arithmetic(operation: Operation, first: Value, second: Value, clamp: bool = False) -> Value:
+    """What a Math node makes of two numbers."""
+    value = Arithmetic(operation, first, second, clamp)
+    constant = isinstance(first, Constant) and isinstance(second, Constant)
+    return Constant(finite(float(value.value_at(_NOWHERE)[0]))) if constant else value
+
+
+def clamped(value: Value) -> Value:
+    """To [0, 1]."""
+    return arithmetic("add", value, Constant(0.0), clamp=True)
+
+
+def product(first: Value, second: Value) -> Value:
+    """The product of two numbers."""
+    return first if isinstance(second, Constant) and second.number == 1 else arithmetic("multiply", first, second)

@@ -12,14 +12,14 @@ from typing import BinaryIO
 
 
 @dataclass(frozen=True)
-class Limits:
+class ImageLimits:
     """What an image may promise: pixels a side, and bytes once decoded (4 a pixel, 16 in float images)."""
 
     side: int = 32768
     decoded: int = 2**30
 
 
-DEFAULT_LIMITS = Limits()
+DEFAULT_LIMITS = ImageLimits()
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pixels of Blender's images, as Cycles would sample them, and facts about images that nobody decodes."""
+"""Pixels of Blender's images, as Cycles would sample them."""
 
 from __future__ import annotations
 
-import hashlib
-import io
 import os
-import re
 import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -18,18 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...metric.colorspace import encode_srgb
-from ...metric.errors import FileError, ImageSizeError, MeshError
+from ...metric.errors import FileError
 from ...metric.texture import ImageFacts, Texture
-from .image_headers import DEFAULT_LIMITS, Header, Limits, file_header, read_header
+from .. import arrays
+from .expressions import BRIGHTEST
+from .image_files import check_limits, crashes, image_digest, image_facts, image_header, tile_path
+from .image_headers import DEFAULT_LIMITS, ImageLimits, file_header
 
 LINEAR_SPACES = frozenset({"Non-Color", "Linear Rec.709", "scene_linear"})
-BRIGHTEST = 1e6  # linear light in float images is kept within this, so that nothing made of it overflows
 _LIGHT_FORMATS = frozenset({"OPEN_EXR", "OPEN_EXR_MULTILAYER", "HDR", "DPX", "CINEON"})  # hold linear light
 _IS_OLD = bpy.app.version < (5, 2)
 _ODD_KINDS = frozenset({"bmp", "jp2", "sgi", "webp"})  # whose colors an old Cycles does not multiply by alpha
 DARKEST = 1e-4  # what is not black of floats: as linear light, less than bytes can tell from it
-_SMALL = 2**24  # bytes that a process has
-_FRAME = re.compile(r"(.*?)(\d+)(\D*)", re.DOTALL)
 _BLOCK = 2**18  # floats that are converted at a time: what a processor's cache holds
 
 
@@ -65,11 +62,11 @@ class TextureCache:
         self._digests: dict[int, str] = {}
         self.looks: dict[int, Any] = {}  # by material.read_look alone
 
-    def pixels(self, image: bpy.types.Image, limits: Limits) -> Pixels | None:
+    def pixels(self, image: bpy.types.Image, limits: ImageLimits) -> Pixels | None:
         """As read_pixels; what another asset still holds of the same content is shared."""
         return self._once((image.as_pointer(), 0), lambda: self._shared(image, limits))
 
-    def tile(self, image: bpy.types.Image, number: int, limits: Limits) -> Pixels | None:
+    def tile(self, image: bpy.types.Image, number: int, limits: ImageLimits) -> Pixels | None:
         """As read_tile."""
         return self._once((image.as_pointer(), number), lambda: read_tile(image, number, limits))
 
@@ -83,7 +80,7 @@ class TextureCache:
             self._digests[key] = image_digest(image)
         return self._digests[key]
 
-    def _shared(self, image: bpy.types.Image, limits: Limits) -> Pixels | None:
+    def _shared(self, image: bpy.types.Image, limits: ImageLimits) -> Pixels | None:
         """LODs mostly carry the reference's own images: decoding and keeping them again would cost twice."""
         stale = image.has_data and image.packed_file is None  # what Blender holds may be older than the file
         if image.source != "FILE" or image.is_dirty or stale or not self._digest(image):
@@ -107,7 +104,7 @@ class TextureCache:
         return self._pixels[key]
 
 
-def read_pixels(image: bpy.types.Image, limits: Limits = DEFAULT_LIMITS) -> Pixels | None:
+def read_pixels(image: bpy.types.Image, limits: ImageLimits = DEFAULT_LIMITS) -> Pixels | None:
     """The pixels of an image that is no UDIM set; None where it is missing or broken. Only what was decoded for this
     is given back to Blender: freeing other buffers would erase unsaved painting.
 
@@ -121,9 +118,7 @@ def read_pixels(image: bpy.types.Image, limits: Limits = DEFAULT_LIMITS) -> Pixe
         width, height = image.size
         if not width or not height:
             return None
-        values: NDArray[np.float32] = np.empty(width * height * image.channels, np.float32)
-        image.pixels.foreach_get(values)
-        values = values.reshape(height, width, image.channels)
+        values = arrays.read_pixels(image).reshape(height, width, image.channels)
         return _float_pixels(image, values) if image.is_float else _byte_pixels(image, values)
     finally:
         if not was_there and image.source == "FILE" and not image.is_dirty:
@@ -199,7 +194,7 @@ def _row_blocks(values: NDArray[Any]) -> list[slice]:
 
 
 def black_warnings(name: str, values: NDArray[Any]) -> tuple[str, ...]:
-    """One, where an image shows nothing but black, as those do that Blender cannot decode and calls loaded."""
+    """A warning where an image shows nothing but black, as those do that Blender cannot decode and calls loaded."""
     darkest = 1 if values.dtype == np.uint8 else DARKEST
     if any((values[rows, :, :3] >= darkest).any() for rows in _row_blocks(values)):
         return ()
@@ -222,7 +217,7 @@ def _has_odd_alpha(image: bpy.types.Image) -> bool:
     return header is not None and (header.is_grey_with_alpha or (_IS_OLD and header.kind in _ODD_KINDS))
 
 
-def read_tile(image: bpy.types.Image, number: int, limits: Limits = DEFAULT_LIMITS) -> Pixels | None:
+def read_tile(image: bpy.types.Image, number: int, limits: ImageLimits = DEFAULT_LIMITS) -> Pixels | None:
     """The pixels of one tile of a UDIM set, by its number (1001 ...); None where it is missing or broken.
 
     Raises:
@@ -254,209 +249,7 @@ def _tile_image(image: bpy.types.Image, number: int) -> Iterator[bpy.types.Image
         bpy.data.images.remove(own)
 
 
-def image_path(image: bpy.types.Image) -> str:
-    """The absolute path of an image's file, "" for an image made in Blender."""
-    if image.source == "GENERATED" or not image.filepath:
-        return ""
-    path = bpy.path.abspath(image.filepath, library=image.library)
-    if "\\" in path and not os.path.exists(path):  # written on Windows, as Blender reads it elsewhere
-        path = path.replace("\\", "/")
-    return os.path.normpath(path)
-
-
-def image_paths(image: bpy.types.Image) -> list[str]:
-    """The absolute paths of an image's files: of a UDIM set's tiles, of others one."""
-    if image.source == "TILED":
-        return [tile_path(image, tile.number) for tile in image.tiles]
-    return [image_path(image)]
-
-
-def same_content(one: bpy.types.Image, other: bpy.types.Image) -> bool:
-    """Whether Cycles takes two images for one: read from one file in one way."""
-    if one == other or other is None:
-        return one == other
-
-    def way(image: bpy.types.Image) -> tuple[str, ...]:
-        return image_path(image), image.source, image.colorspace_settings.name, image.alpha_mode
-
-    held = any(each.packed_file or each.is_dirty or each.source == "GENERATED" for each in (one, other))
-    return not held and way(one) == way(other)
-
-
-def tile_path(image: bpy.types.Image, number: int) -> str:
-    """The absolute path of a tile's file, after Blender's two ways to number them."""
-    column, row = tile_place(number)
-    path = image_path(image)
-    return path.replace("<UDIM>", str(number)).replace("<UVTILE>", f"u{column + 1}_v{row + 1}")
-
-
-def tile_place(number: int) -> tuple[int, int]:
-    """Column and row of a tile: 1001 is (0, 0), 1002 (1, 0), 1011 (0, 1)."""
-    return (number - 1001) % 10, (number - 1001) // 10
-
-
-def why_unread(image: bpy.types.Image) -> str:
-    """Which image could not be read and what is wrong with it, for messages."""
-    path = image_path(image)
-    what = "is broken or of a kind that Blender cannot read"
-    if image.packed_file is None and not os.path.exists(path):
-        what = "is missing"
-    elif "\\" in path and os.sep == "/":
-        what = "has a backslash in its name, which Blender takes for a slash"
-    return f"{path or image.name}: the base-color image {what}"
-
-
-def check_limits(image: bpy.types.Image, limits: Limits) -> None:
-    """Refuses an image before anything decodes it.
-
-    Raises:
-        ImageSizeError: its header promises more than the limits.
-        MeshError: Blender would crash, or wait for ever, at its file; or there is no room for its pixels.
-    """
-    name = image_path(image) or image.name
-    needed = 0
-    for place, header in _all_headers(image):
-        if header is not None:
-            _check(header, place or name, limits)
-            needed = max(needed, header.decoded)
-    if not image.has_data:
-        reserve(needed, f"{name}: the image")
-
-
-def _all_headers(image: bpy.types.Image) -> Iterator[tuple[str, Header | None]]:
-    """Path and header of everything that may be decoded for an image: all tiles, all frames; "" is the image itself.
-
-    Raises:
-        MeshError: a path leads to a pipe or a device.
-    """
-    if image.source == "GENERATED" or image.packed_files:
-        yield "", image_header(image)
-        for file in image.packed_files:
-            if file.packed_file is not None:
-                yield "", read_header(io.BytesIO(file.packed_file.data))
-        return
-    paths = image_paths(image)
-    if image.source == "SEQUENCE":
-        paths += _frames(paths[0])
-    for path in paths:
-        if os.path.exists(path) and not (os.path.isfile(path) or os.path.isdir(path)):
-            raise MeshError(f"{path}: the image is a pipe or a device; a file is wanted")
-        yield path, file_header(path)
-
-
-def _frames(path: str) -> list[str]:
-    """The files beside one that differ from it only in the last number of its name."""
-    folder, name = os.path.split(path)
-    match = _FRAME.fullmatch(name)
-    if match is None:
-        return []
-    wanted = re.compile(re.escape(match[1]) + r"\d+" + re.escape(match[3]))
-    try:
-        return sorted(os.path.join(folder, each) for each in os.listdir(folder) if wanted.fullmatch(each))
-    except OSError:
-        return []
-
-
-def reserve(size: int, what: str) -> None:
-    """Tells whether there is room for so many bytes: Blender and Cycles go on without an image that they find none for.
-
-    Raises:
-        MeshError: there is not.
-    """
-    if size < _SMALL:
-        return
-    try:
-        np.empty(size, np.uint8)
-    except MemoryError as error:
-        raise MeshError(
-            f"{what} would take {size:,} bytes once decoded, more than there is memory for; allow more memory, or make "
-            "the image smaller"
-        ) from error
-
-
-def crashes(header: Header | None) -> str:
-    """Why an image with such a header must not be loaded: a Blender would crash; "" where it may."""
-    if _IS_OLD and header is not None and header.kind == "jp2" and header.is_grey_with_alpha:
-        return "Blender before 5.2 crashes at a JPEG 2000 image of grey and alpha; save it as a PNG"
-    if header is not None and header.is_cut:
-        return "the image is broken, its rows are not where it says; save it again"
-    return ""
-
-
-def _check(header: Header, name: str, limits: Limits) -> None:
-    if why := crashes(header):
-        raise MeshError(f"{name}: {why}")
-    size = f"{header.width} x {header.height} pixels"
-    if max(header.width, header.height) > limits.side:
-        raise ImageSizeError(f"{name}: the image promises {size}, more than the {limits.side} a side that are allowed")
-    if header.decoded > limits.decoded:
-        raise ImageSizeError(
-            f"{name}: the image promises {size}, {header.decoded} bytes once decoded, more than the {limits.decoded} "
-            "that are allowed"
-        )
-
-
-def image_header(image: bpy.types.Image) -> Header | None:
-    """Size and kind of an image (a UDIM set's first tile) without decoding it; None where that cannot be known."""
-    if image.source == "GENERATED":
-        return Header(image.generated_width, image.generated_height, image.use_generated_float)
-    if image.packed_file is not None:
-        return read_header(io.BytesIO(image.packed_file.data))
-    path = image_path(image)
-    return file_header(tile_path(image, image.tiles[0].number) if image.source == "TILED" else path)
-
-
-def image_facts(image: bpy.types.Image, role: str, digest: str) -> ImageFacts:
-    """What a report says about an image; nothing is decoded."""
-    header = image_header(image)
-    return ImageFacts(
-        role=role,
-        name=image.name,
-        path=image_path(image),
-        width=header.width if header is not None else 0,
-        height=header.height if header is not None else 0,
-        color_space=image.colorspace_settings.name,
-        missing=not digest,
-        digest=digest,
-    )
-
-
-def image_digest(image: bpy.types.Image) -> str:
-    """The same for the same content: of painted or generated images the pixels, else the file's bytes, of UDIM sets
-    all tiles' files; "" where there is nothing."""
-    digest = hashlib.blake2b(digest_size=16)
-    if image.source == "GENERATED" and not image.is_dirty:
-        kind = image.generated_type, image.generated_width, image.generated_height, image.use_generated_float
-        return hashlib.blake2b(repr((kind, tuple(image.generated_color))).encode(), digest_size=16).hexdigest()
-    if image.is_dirty:
-        values: NDArray[np.float32] = np.empty(len(image.pixels), np.float32)
-        image.pixels.foreach_get(values)
-        digest.update(values.tobytes())
-        return digest.hexdigest()
-    found = False
-    for block in _blocks(image):
-        digest.update(block)
-        found = True
-    return digest.hexdigest() if found else ""
-
-
-def _blocks(image: bpy.types.Image) -> Iterator[bytes]:
-    """The bytes of an image's files, in pieces."""
-    packed = [file.packed_file.data for file in image.packed_files]
-    if packed:
-        yield from packed
-        return
-    for path in image_paths(image):
-        if os.path.isfile(path) and os.access(path, os.R_OK):
-            try:
-                with open(path, "rb") as file:
-                    while block := file.read(2**20):
-                        yield block
-            except OSError as error:
-                raise MeshError(f"{path}: the image cannot be read ({error.strerror})") from error
-
-
-def load_texture(path: str, limits: Limits = DEFAULT_LIMITS) -> Texture:
+def load_texture(path: str, limits: ImageLimits = DEFAULT_LIMITS) -> Texture:
     """An image file as a repeating texture; its alpha does not count; nothing stays in bpy.data.
 
     Raises:

@@ -14,6 +14,7 @@ from ...metric.errors import FMQMError
 
 _IS_OLD = bpy.app.version < (5, 2)
 DEEPEST = 100  # groups within groups
+TRANSPARENT = {"BSDF_TRANSPARENT", "HOLDOUT"}  # shaders without a color of their own
 _ROLES = {"Base Color": "base color", "Color": "base color", "Alpha": "alpha", "Fac": "alpha", "Factor": "alpha"}
 
 
@@ -26,36 +27,37 @@ class NotReadError(FMQMError):
 
 
 @dataclass(frozen=True)
-class Place:
-    """A socket, and the group nodes that lead to its tree."""
+class NestedSocket:
+    """A socket in nested node groups, with the group nodes that lead to its tree."""
 
     socket: bpy.types.NodeSocket
     groups: tuple[bpy.types.Node, ...] = ()
 
     @property
     def node(self) -> bpy.types.Node:
+        """The node of the socket."""
         return self.socket.node
 
-    def input(self, name: str | int) -> Place:
+    def input(self, name: str | int) -> NestedSocket:
         """What feeds an input of this place's node, by its name or number."""
-        return source(Place(self.node.inputs[name], self.groups))
+        return source(NestedSocket(self.node.inputs[name], self.groups))
 
 
-def outputs(material: bpy.types.Material, names: Iterable[str] = ("Surface", "Displacement")) -> list[Place]:
+def outputs(material: bpy.types.Material, names: Iterable[str] = ("Surface", "Displacement")) -> list[NestedSocket]:
     """What feeds the active output: of these inputs, those that something feeds."""
     output = active_output(material.node_tree) if uses_nodes(material) else None
     if output is None:
         return []
-    return [Place(output.inputs[name]) for name in names if _link(output.inputs[name])]
+    return [NestedSocket(output.inputs[name]) for name in names if _link(output.inputs[name])]
 
 
 def active_output(tree: bpy.types.NodeTree) -> bpy.types.Node | None:
-    """Cycles' own output first, as it bakes; asked for "ALL", Blender finds neither renderer's own."""
+    """The output node that counts: Cycles' own first, as it bakes; asked for "ALL", Blender finds no renderer's own."""
     return tree.get_output_node("CYCLES") or tree.get_output_node("EEVEE")
 
 
 def uses_nodes(material: bpy.types.Material) -> bool:
-    """Before Blender 5 a material may have nodes and not use them; later use_nodes has no effect, and warns."""
+    """Whether a material's nodes count: before Blender 5 it may have some and not use them; later use_nodes warns."""
     return material.node_tree is not None and (bpy.app.version >= (5, 0) or material.use_nodes)
 
 
@@ -71,7 +73,7 @@ def node_count(tree: bpy.types.NodeTree, known: dict[bpy.types.NodeTree, float] 
     return known[tree]
 
 
-def surface_of(material: bpy.types.Material) -> Place | None:
+def surface_of(material: bpy.types.Material) -> NestedSocket | None:
     """The output's surface socket, where something feeds it."""
     return next((place for place in outputs(material) if place.socket.name == "Surface"), None)
 
@@ -81,7 +83,7 @@ def _link(socket: bpy.types.NodeSocket) -> bpy.types.NodeLink | None:
     return next((link for link in socket.links if link.is_valid and not link.is_muted), None)
 
 
-def source(place: Place, converting: bool = False) -> Place:
+def source(place: NestedSocket, converting: bool = False) -> NestedSocket:
     """The output that feeds an input, through reroutes, muted nodes and groups; where none does, the input whose own
     value counts: since Blender 5.2 never one of a reroute or a muted node.
 
@@ -95,20 +97,22 @@ def source(place: Place, converting: bool = False) -> Place:
     while (link := _link(place.socket)) is not None:
         output, node = link.from_socket, link.from_node
         if node.type == "REROUTE":
-            place = Place(node.inputs[0], place.groups)
+            place = NestedSocket(node.inputs[0], place.groups)
         elif node.mute:
             through = next((inner.from_socket for inner in node.internal_links if inner.to_socket == output), None)
             if _IS_OLD and (through is None or _link(through) is None):
                 raise NotReadError(node, "is muted and lets nothing through")
             if through is None:
                 return own
-            place = Place(through, place.groups)
+            place = NestedSocket(through, place.groups)
         elif node.type == "GROUP":
-            own = place = Place(_group_result(node, output.identifier), (*place.groups, node))
+            own = place = NestedSocket(_group_result(node, output.identifier), (*place.groups, node))
         elif node.type == "GROUP_INPUT":
-            own = place = Place(by_identifier(place.groups[-1].inputs, output.identifier, node), place.groups[:-1])
+            own = place = NestedSocket(
+                by_identifier(place.groups[-1].inputs, output.identifier, node), place.groups[:-1]
+            )
         else:
-            return Place(output, place.groups)
+            return NestedSocket(output, place.groups)
         if family(place.socket) != wanted and not converting:
             raise NotReadError(node, "turns a color into a number or a number into a color")
     return place if _IS_OLD else own
@@ -142,7 +146,7 @@ def by_identifier(sockets: Any, identifier: str, node: bpy.types.Node) -> bpy.ty
     return found
 
 
-def only_shines(node: bpy.types.Node) -> bool:
+def only_emits(node: bpy.types.Node) -> bool:
     """Whether all that is seen of a Principled BSDF is its emission: the base color is plain black, as in glTF files
     of what has no light on it."""
     if node.type != "BSDF_PRINCIPLED" or _link(node.inputs["Base Color"]) is not None:
@@ -153,15 +157,24 @@ def only_shines(node: bpy.types.Node) -> bool:
     return lit and shines and max(base.default_value[:3]) <= 0
 
 
-def upstream(start: Place) -> Iterator[tuple[bpy.types.Node, str]]:
+def color_of(shader: bpy.types.Node) -> bpy.types.NodeSocket | None:
+    """The input that is a shader's base color; None if it has none or lets all light through."""
+    if shader.type in TRANSPARENT:
+        return None
+    if only_emits(shader):
+        return shader.inputs["Emission Color"]
+    return shader.inputs.get("Base Color") or shader.inputs.get("Color")
+
+
+def upstream(start: NestedSocket) -> Iterator[tuple[bpy.types.Node, str]]:
     """Every node that an input depends on, with its role: the name of the shader's input that it feeds."""
     for place, role in upstream_outputs(start):
         yield place.node, role
 
 
 def upstream_outputs(
-    start: Place, dropped: Callable[[Place], Iterable[bpy.types.NodeSocket]] = lambda _: ()
-) -> Iterator[tuple[Place, str]]:
+    start: NestedSocket, dropped: Callable[[NestedSocket], Iterable[bpy.types.NodeSocket]] = lambda _: ()
+) -> Iterator[tuple[NestedSocket, str]]:
     """Every output that an input depends on, with its role.
 
     Args:
@@ -184,11 +197,11 @@ def upstream_outputs(
             if socket in idle:
                 continue
             own = place.socket.type == "SHADER" and socket.type != "SHADER"
-            queue.append((Place(socket, place.groups), _role(socket) if own else role))
+            queue.append((NestedSocket(socket, place.groups), _role(socket) if own else role))
 
 
 def _role(socket: bpy.types.NodeSocket) -> str:
     """Of what feeds a shader's input."""
-    if socket.name == "Emission Color" and only_shines(socket.node):
+    if socket.name == "Emission Color" and only_emits(socket.node):
         return "base color"
     return _ROLES.get(socket.name, socket.name)

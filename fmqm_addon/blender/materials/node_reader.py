@@ -6,23 +6,16 @@ Nothing here guesses: what is read is what Cycles shows, which the tests hold ag
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
-from math import isfinite
 
 import bpy
-import numpy as np
-from mathutils import Euler, Matrix
 
-from ...metric.colorspace import encode_srgb
 from ...metric.errors import ImageMissingError
-from ...metric.geometry import Floats
 from ...metric.texture import (
     MISSING,
     Alpha,
     Color,
     Extension,
-    Fold,
     Interpolation,
     Placement,
     PlainColor,
@@ -31,7 +24,10 @@ from ...metric.texture import (
 )
 from .cycles_alpha import merged, used_alphas
 from .expressions import (
-    Arithmetic,
+    AVERAGE,
+    CHANNELS,
+    LUMINANCE,
+    OPERATIONS,
     Constant,
     Encoded,
     Grey,
@@ -39,19 +35,21 @@ from .expressions import (
     Light,
     Mix,
     Opacity,
-    Operation,
     PlainLight,
-    Scaled,
     Value,
     VertexColor,
-    Weighted,
+    arithmetic,
+    clamped,
+    evaluated,
+    finite,
+    plain_color,
+    product,
+    scaled,
+    weighted,
 )
-from .images import (
-    BRIGHTEST,
-    Pixels,
-    TextureCache,
-    black_warnings,
+from .image_files import (
     check_limits,
+    has_pixels,
     image_header,
     image_path,
     reserve,
@@ -60,8 +58,10 @@ from .images import (
     tile_place,
     why_unread,
 )
-from .node_graph import NotReadError, Place, by_identifier, family, only_shines, source, upstream
-from .types import Layer, Reading
+from .images import Pixels, TextureCache, black_warnings
+from .node_graph import NestedSocket, NotReadError, by_identifier, family, only_emits, source, upstream
+from .types import MeshLayer, Reading
+from .uv_nodes import is_mapped, is_of_mesh, placement_of
 
 MOST_NODES = 200  # of what feeds a base color; read trees are evaluated recursively
 _EXTENSIONS: dict[str, Extension] = {"REPEAT": "repeat", "EXTEND": "extend", "CLIP": "clip", "MIRROR": "mirror"}
@@ -71,34 +71,7 @@ _INTERPOLATIONS: dict[str, Interpolation] = {
     "Cubic": "cubic",
     "Smart": "cubic",  # to Cycles they are the same
 }
-_OPERATIONS: dict[str, Operation] = {
-    "ADD": "add",
-    "SUBTRACT": "subtract",
-    "MULTIPLY": "multiply",
-    "LESS_THAN": "less",
-    "GREATER_THAN": "greater",
-    "ROUND": "round",
-    "MINIMUM": "minimum",
-    "MAXIMUM": "maximum",
-}
-_LUMINANCE = (0.2126729, 0.7151522, 0.0721750)  # a color where a number is wanted
-_AVERAGE = (1 / 3, 1 / 3, 1 / 3)  # a vector where a number is wanted
-_CHANNELS = {"Red": (1.0, 0.0, 0.0), "Green": (0.0, 1.0, 0.0), "Blue": (0.0, 0.0, 1.0)} | {
-    "X": (1.0, 0.0, 0.0),
-    "Y": (0.0, 1.0, 0.0),
-    "Z": (0.0, 0.0, 1.0),
-}
 FIRST_ROLES = ("base color", "alpha")  # of the images, before all others
-
-
-def plain_color(linear: tuple[float, ...]) -> PlainColor:
-    red, green, blue = encode_srgb(np.array([_finite(x) for x in linear])).tolist()
-    return PlainColor((red, green, blue))
-
-
-def _finite(number: float) -> float:
-    """Sockets take any float; what is made of them must stay finite."""
-    return min(max(number, -BRIGHTEST), BRIGHTEST) if isfinite(number) else 0.0
 
 
 @dataclass(frozen=True)
@@ -106,11 +79,13 @@ class _Transparent:
     """What a Transparent BSDF is to the shaders that it is mixed with: nothing."""
 
 
-class Reader:
+class MaterialReader:
     """Reads one material; collects on the way what it wants of the mesh and what was assumed."""
 
-    def __init__(self, material: bpy.types.Material, surface: Place, cache: TextureCache, reading: Reading) -> None:
-        self.layers: list[Layer] = []
+    def __init__(
+        self, material: bpy.types.Material, surface: NestedSocket, cache: TextureCache, reading: Reading
+    ) -> None:
+        self.layers: list[MeshLayer] = []
         self.warnings: list[str] = []
         self._name = material.name
         self._surface = surface
@@ -138,21 +113,21 @@ class Reader:
         opaque = isinstance(value, Constant) and value.number >= 1
         return color, None if opaque else Opacity(value)
 
-    def channel(self, layer: Layer) -> int:
+    def channel(self, layer: MeshLayer) -> int:
         """The first channel of the corner values that belongs to a layer; adds it to what the mesh must offer."""
         if layer not in self.layers:
             self.layers.append(layer)
         return sum(each.width for each in self.layers[: self.layers.index(layer)])
 
-    def _shader(self, place: Place) -> tuple[Light | _Transparent, Value]:
+    def _shader(self, place: NestedSocket) -> tuple[Light | _Transparent, Value]:
         """Color and opacity of what a shader output shows."""
-        self._count(place)
+        self.count(place)
         kind = place.node.type
         if not place.socket.is_output:
             raise NotReadError(place.node, "lacks a shader")
         if kind == "BSDF_PRINCIPLED":
-            shines = only_shines(place.node)
-            light = self._emission(place, "Emission ") if shines else self._light(place.input("Base Color"))
+            emits = only_emits(place.node)
+            light = self._emission(place, "Emission ") if emits else self._light(place.input("Base Color"))
             return light, self._opacity(place.input("Alpha"))
         if kind == "BSDF_DIFFUSE":
             return self._light(place.input("Color")), Constant(1.0)
@@ -164,13 +139,13 @@ class Reader:
             return self._mixed_shader(place)
         raise NotReadError(place.node, "is a shader that is not read")
 
-    def _emission(self, place: Place, prefix: str = "") -> Light:
+    def _emission(self, place: NestedSocket, prefix: str = "") -> Light:
         """What a shader emits, by its inputs Color and Strength, whose names begin with the prefix."""
-        strength = self._number(place.input(f"{prefix}Strength"), place.node, "Strength")
-        return _scaled(self._light(place.input(f"{prefix}Color")), (strength,) * 3, (0.0,) * 3)
+        strength = self.number(place.input(f"{prefix}Strength"), place.node, "Strength")
+        return scaled(self._light(place.input(f"{prefix}Color")), (strength,) * 3, (0.0,) * 3)
 
-    def _mixed_shader(self, place: Place) -> tuple[Light | _Transparent, Value]:
-        share = _clamped(self._factor(place))
+    def _mixed_shader(self, place: NestedSocket) -> tuple[Light | _Transparent, Value]:
+        share = clamped(self._factor(place))
         if isinstance(share, Constant) and share.number in {0, 1}:
             shown, hidden = (2, 1) if share.number else (1, 2)
             light, value = self._shader(place.input(shown))
@@ -179,12 +154,12 @@ class Reader:
             return light, value
         (first, first_alpha), (second, second_alpha) = self._shader(place.input(1)), self._shader(place.input(2))
         if isinstance(first, _Transparent):
-            return second, _product(share, _clamped(second_alpha))
+            return second, product(share, clamped(second_alpha))
         if isinstance(second, _Transparent):
-            return first, _product(_arithmetic("subtract", Constant(1.0), share), _clamped(first_alpha))
+            return first, product(arithmetic("subtract", Constant(1.0), share), clamped(first_alpha))
         raise NotReadError(place.node, "mixes two shaders")
 
-    def _factor(self, place: Place) -> Value:
+    def _factor(self, place: NestedSocket) -> Value:
         """Of a mix of shaders. An image that is missing hides the transparent one."""
         self._lost = 0.0 if place.input(2).node.type == "BSDF_TRANSPARENT" else 1.0
         try:
@@ -192,7 +167,7 @@ class Reader:
         finally:
             self._lost = None
 
-    def _opacity(self, place: Place) -> Value:
+    def _opacity(self, place: NestedSocket) -> Value:
         """The value at Alpha; opaque, with a warning, where it is not read."""
         known = len(self.layers)
         self._lost = 1.0
@@ -205,20 +180,21 @@ class Reader:
         finally:
             self._lost = None
 
-    def _count(self, place: Place) -> None:
+    def count(self, place: NestedSocket) -> None:
+        """Counts a node that is read; NotReadError beyond MOST_NODES."""
         self._nodes += 1
         if self._nodes > MOST_NODES:
             raise NotReadError(place.node, "ends a tree of too many nodes")
 
-    def _light(self, place: Place) -> Light:
+    def _light(self, place: NestedSocket) -> Light:
         """The color at an input: of the output that feeds it, or its own."""
-        self._count(place)
+        self.count(place)
         node, socket = place.node, place.socket
         if not socket.is_output or node.type in {"RGB", "VALUE"}:
             value = socket.default_value
             # Vectors may have two dimensions.
             rgb = (value,) * 3 if socket.type == "VALUE" else (*tuple(value)[:3], 0.0)[:3]
-            return PlainLight((_finite(rgb[0]), _finite(rgb[1]), _finite(rgb[2])))
+            return PlainLight((finite(rgb[0]), finite(rgb[1]), finite(rgb[2])))
         if family(socket) == "VALUE":
             number = self._value(place)
             return PlainLight((number.number,) * 3) if isinstance(number, Constant) else Grey(number)
@@ -235,20 +211,20 @@ class Reader:
             return self._vector_math(place)
         raise NotReadError(node, "is not read")
 
-    def _mix(self, place: Place, names: tuple[str, str, str], clamp_factor: bool, clamp: bool) -> Light:
+    def _mix(self, place: NestedSocket, names: tuple[str, str, str], clamp_factor: bool, clamp: bool) -> Light:
         node = place.node
         if node.blend_type not in {"MIX", "MULTIPLY"}:
             raise NotReadError(node, f"blends by {node.blend_type.replace('_', ' ').lower()}")
-        inputs = [source(Place(by_identifier(node.inputs, name, node), place.groups)) for name in names]
-        factor = self._number(inputs[0], node, "factor")
+        inputs = [source(NestedSocket(by_identifier(node.inputs, name, node), place.groups)) for name in names]
+        factor = self.number(inputs[0], node, "factor")
         if clamp_factor:
             factor = min(max(factor, 0.0), 1.0)
         first, second = self._light(inputs[1]), self._light(inputs[2])
         mixed = Mix(first, second, factor, node.blend_type == "MULTIPLY", clamp)
         plain = isinstance(first, PlainLight) and isinstance(second, PlainLight)
-        return _evaluated(mixed) if plain else mixed
+        return evaluated(mixed) if plain else mixed
 
-    def _vector_math(self, place: Place) -> Light:
+    def _vector_math(self, place: NestedSocket) -> Light:
         node = place.node
         lights = [self._light(place.input(number)) for number in range(3 if node.operation == "MULTIPLY_ADD" else 2)]
         if node.operation in {"MULTIPLY", "ADD"} and isinstance(lights[0], PlainLight):
@@ -259,22 +235,22 @@ class Reader:
         ones, zeros = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
         scale = ones if node.operation == "ADD" else constants[0]
         bias = zeros if node.operation == "MULTIPLY" else constants[-1]
-        return _scaled(lights[0], scale, bias)
+        return scaled(lights[0], scale, bias)
 
     def _attribute(self, node: bpy.types.Node) -> VertexColor | None:
         """The color attribute that a node names; None where it names none."""
         if node.type == "VERTEX_COLOR":
-            return VertexColor(self.channel(Layer("color", node.layer_name)))
-        if not _is_of_mesh(node):
+            return VertexColor(self.channel(MeshLayer("color", node.layer_name)))
+        if not is_of_mesh(node):
             raise NotReadError(node, "reads no attribute of the mesh")
         if node.attribute_name:
-            return VertexColor(self.channel(Layer("color", node.attribute_name)))
-        told = f"material {self._name}: {node.name} names no attribute; it is black, as Blender renders it"
-        self.warnings.append(told)
+            return VertexColor(self.channel(MeshLayer("color", node.attribute_name)))
+        text = f"material {self._name}: {node.name} names no attribute; it is black, as Blender renders it"
+        self.warnings.append(text)
         return None
 
     def check_images(self) -> None:
-        """Of what is to be baked: Cycles would decode images of any size, and show missing ones in magenta, silently.
+        """Refuses images that baking must not meet: Cycles decodes any size and shows missing ones in magenta.
 
         Raises:
             MeshError: as read_look.
@@ -287,7 +263,7 @@ class Reader:
             if node.image is not None:
                 check_limits(node.image, self._reading.limits)
                 held[node.image] = None
-            if role == "base color" and not _has_pixels(node.image):
+            if role == "base color" and not has_pixels(node.image):
                 self._missing(node)
         # Cycles decodes them once more, all at a time, beside what it makes of them.
         headers = [image_header(image) for image in held]
@@ -304,14 +280,14 @@ class Reader:
         self.warnings.append(f"{what}; magenta stands in for it")
         return PlainLight(MISSING)
 
-    def _value(self, place: Place) -> Value:
+    def _value(self, place: NestedSocket) -> Value:
         """The number at an input: of the output that feeds it, or its own."""
-        self._count(place)
+        self.count(place)
         node, socket = place.node, place.socket
         if family(socket) != "VALUE":
-            return _weighted(self._light(place), _AVERAGE if socket.type == "VECTOR" else _LUMINANCE)
+            return weighted(self._light(place), AVERAGE if socket.type == "VECTOR" else LUMINANCE)
         if not socket.is_output or node.type == "VALUE":
-            return Constant(_finite(float(socket.default_value)))
+            return Constant(finite(float(socket.default_value)))
         if node.type == "TEX_IMAGE":
             texture = self._texture(place)
             return Constant(self._lost if self._lost is not None else 1.0) if texture is None else ImageAlpha(texture)
@@ -320,23 +296,24 @@ class Reader:
         if node.type == "LIGHT_PATH" and socket.name.startswith("Is "):
             return Constant(float(socket.name == "Is Camera Ray"))  # the eye's
         if node.type == "SEPXYZ" or (node.type == "SEPARATE_COLOR" and node.mode == "RGB"):
-            return _weighted(self._light(place.input(0)), _CHANNELS[socket.identifier])
-        if node.type == "MATH" and node.operation in _OPERATIONS:
+            return weighted(self._light(place.input(0)), CHANNELS[socket.identifier])
+        if node.type == "MATH" and node.operation in OPERATIONS:
             first = self._value(place.input(0))
             second = Constant(0.0) if node.operation == "ROUND" else self._value(place.input(1))
-            return _arithmetic(_OPERATIONS[node.operation], first, second, node.use_clamp)
+            return arithmetic(OPERATIONS[node.operation], first, second, node.use_clamp)
         if node.type == "MATH" and node.operation == "MULTIPLY_ADD":
             first, second, third = (self._value(place.input(number)) for number in range(3))
-            return _arithmetic("add", _arithmetic("multiply", first, second), third, node.use_clamp)
+            return arithmetic("add", arithmetic("multiply", first, second), third, node.use_clamp)
         raise NotReadError(node, "is not read")
 
-    def _number(self, place: Place, node: bpy.types.Node, what: str) -> float:
+    def number(self, place: NestedSocket, node: bpy.types.Node, what: str) -> float:
+        """The constant number at an input of a node; NotReadError where it varies."""
         value = self._value(place)
         if not isinstance(value, Constant):
             raise NotReadError(node, f"has a {what} that varies")
         return value.number
 
-    def _texture(self, place: Place) -> Texture | Tiles | None:
+    def _texture(self, place: NestedSocket) -> Texture | Tiles | None:
         """The texture of an image node; None where its image is missing."""
         node = place.node
         image = node.image
@@ -344,18 +321,18 @@ class Reader:
             return None
         if node.projection != "FLAT":
             raise NotReadError(node, f"has the projection {node.projection.lower()}")
-        if _is_mapped(node.texture_mapping):
+        if is_mapped(node.texture_mapping):
             raise NotReadError(node, "has a mapping of its own")
         if image.source not in {"FILE", "GENERATED", "TILED"}:
             raise NotReadError(node, f"shows a {image.source.lower()}")
         known = len(self.layers)
-        placement = self._placement(place.input("Vector"))
+        placement = placement_of(place.input("Vector"), self)
         texture = self._tiles(place, placement) if image.source == "TILED" else self._whole(place, placement)
         if texture is None:
             del self.layers[known:]
         return texture
 
-    def _whole(self, place: Place, placement: Placement) -> Texture | None:
+    def _whole(self, place: NestedSocket, placement: Placement) -> Texture | None:
         node = place.node
         pixels = self._cache.pixels(node.image, self._reading.limits)
         if pixels is None and node.image.type == "MULTILAYER":  # Cycles reads its first layer, Python none
@@ -364,11 +341,11 @@ class Reader:
             return None
         texture = self._sampler(place, pixels, placement)
         if node.image.source == "FILE" and self._lost is None:
-            told = black_warnings(image_path(node.image) or node.image.name, pixels.values)
-            self.warnings += [f"material {self._name}: {warning}" for warning in told]
+            texts = black_warnings(image_path(node.image) or node.image.name, pixels.values)
+            self.warnings += [f"material {self._name}: {warning}" for warning in texts]
         return texture
 
-    def _sampler(self, place: Place, pixels: Pixels, placement: Placement) -> Texture:
+    def _sampler(self, place: NestedSocket, pixels: Pixels, placement: Placement) -> Texture:
         node = place.node
         if not pixels.linear and node.image.colorspace_settings.name != "sRGB":
             raise NotReadError(node, f"has an image in the color space {node.image.colorspace_settings.name}")
@@ -385,16 +362,16 @@ class Reader:
             placement=placement,
         )
 
-    def _uses_alpha(self, place: Place) -> bool:
+    def _uses_alpha(self, place: NestedSocket) -> bool:
         """Whether Cycles, which makes one node of equal ones, divides the color at an image's output by its alpha."""
         return any(
             same_content(place.node.image, other.node.image)
-            and not _is_mapped(other.node.texture_mapping)
+            and not is_mapped(other.node.texture_mapping)
             and merged(place, other)
             for other in self._used_alphas
         )
 
-    def _tiles(self, place: Place, placement: Placement) -> Tiles | None:
+    def _tiles(self, place: NestedSocket, placement: Placement) -> Tiles | None:
         node, image = place.node, place.node.image
         if image.is_dirty:
             raise NotReadError(node, "has tiles with unsaved changes")
@@ -413,147 +390,9 @@ class Reader:
             ]
         return Tiles(tuple(tiles), placement) if tiles else None
 
-    def _placement(self, place: Place) -> Placement:
-        """Where the vector at an input lies on an image."""
-        node, socket = place.node, place.socket
-        fold: tuple[Fold, Fold] = ("none", "none")
-        if socket.is_output and node.type == "COMBXYZ":
-            fold, place = self._folded(place)
-        name, matrix = self._uv(place)
-        rows = np.array(matrix, np.float64)
-        affine = None
-        if not np.array_equal(rows, np.eye(4)):
-            (a, b, c), (d, e, f) = np.vectorize(_finite)(rows[:2][:, [0, 1, 3]]).tolist()
-            affine = ((a, b, c), (d, e, f))
-        return Placement(self.channel(Layer("uv", name)), affine, fold)
-
-    def _folded(self, place: Place) -> tuple[tuple[Fold, Fold], Place]:
-        """What is done to u and v apart, as the glTF importer does for unlike wrap modes; and the vector that they
-        are taken from."""
-        folds: list[Fold] = []
-        vectors = set()
-        for number, axis in enumerate("XY"):
-            taken = place.input(number)
-            fold: Fold = "none"
-            if taken.node.type == "MATH":
-                fold = self._fold_of(taken)
-                taken = taken.input(0)
-            if taken.node.type != "SEPXYZ" or taken.socket.name != axis:
-                raise NotReadError(place.node, "combines a vector of more than wrapped u and v")
-            folds.append(fold)
-            vectors.add(taken.input(0))
-        if len(vectors) > 1:
-            raise NotReadError(place.node, "combines two vectors")
-        return (folds[0], folds[1]), vectors.pop()
-
-    def _fold_of(self, place: Place) -> Fold:
-        node = place.node
-        limits = [self._number(place.input(number), node, "limit") for number in (1, 2)]
-        if node.operation == "WRAP" and sorted(limits) == [0, 1]:
-            return "wrap"
-        if node.operation == "PINGPONG" and limits[0] == 1:
-            return "pingpong"
-        raise NotReadError(node, "is not read")
-
-    def _uv(self, place: Place) -> tuple[str, Matrix]:
-        """The UV map that a vector is taken from, and the (4, 4) matrix that leads from (u, v, 0, 1) to it."""
-        self._count(place)
-        node, socket = place.node, place.socket
-        if not socket.is_output:
-            if node.type != "TEX_IMAGE":  # the socket of a group or a mapping: a constant vector
-                raise NotReadError(node, "has no vector")
-            return "", Matrix.Identity(4)
-        if node.type == "TEX_COORD" and socket.name == "UV" and not node.from_instancer:
-            return "", Matrix.Identity(4)
-        if node.type == "UVMAP" and not node.from_instancer:
-            return node.uv_map, Matrix.Identity(4)
-        if _is_of_mesh(node) and node.attribute_name and socket.name in {"Vector", "Color"}:
-            return node.attribute_name, Matrix.Identity(4)
-        if node.type == "MAPPING":
-            name, before = self._uv(place.input("Vector"))
-            return name, self._mapping(place) @ before
-        raise NotReadError(node, "is not read as the vector of an image")
-
-    def _mapping(self, place: Place) -> Matrix:
-        node = place.node
-        scale, rotation = (self._vector(place.input(name), node) for name in ("Scale", "Rotation"))
-        turned = Euler(rotation, "XYZ").to_matrix().to_4x4()
-        if node.vector_type == "VECTOR":
-            return turned @ Matrix.Diagonal((*scale, 1.0))
-        if node.vector_type == "POINT":
-            return (
-                Matrix.Translation(self._vector(place.input("Location"), node)) @ turned @ Matrix.Diagonal((*scale, 1))
-            )
-        if node.vector_type == "TEXTURE":
-            back = Matrix.Diagonal((*(1 / x if x else 0.0 for x in scale), 1.0))  # as Blender divides by 0
-            moved = Matrix.Translation([-x for x in self._vector(place.input("Location"), node)])
-            return back @ turned.transposed() @ moved
-        raise NotReadError(node, f"maps as {node.vector_type.lower()}")
-
-    def _vector(self, place: Place, node: bpy.types.Node) -> tuple[float, float, float]:
+    def vector(self, place: NestedSocket, node: bpy.types.Node) -> tuple[float, float, float]:
+        """The constant vector at an input of a node; NotReadError where it varies."""
         light = self._light(place)
         if not isinstance(light, PlainLight):
             raise NotReadError(node, "has an input that varies")
         return light.rgb
-
-
-def _has_pixels(image: bpy.types.Image | None) -> bool:
-    """Whether Cycles, as far as is known before it bakes, has something to show of an image."""
-    if image is None:
-        return False
-    if image.source == "SEQUENCE":  # of which Blender tells no size
-        return os.path.isfile(image_path(image)) or image.packed_file is not None
-    return bool(image.size[0]) or image.type == "MULTILAYER"
-
-
-def _is_of_mesh(node: bpy.types.Node) -> bool:
-    return bool(node.type == "ATTRIBUTE" and node.attribute_type == "GEOMETRY")
-
-
-def _is_mapped(mapping: bpy.types.TexMapping) -> bool:
-    """Whether an image node's own, hidden mapping does anything."""
-    return (
-        any((*mapping.translation, *mapping.rotation))
-        or tuple(mapping.scale) != (1, 1, 1)
-        or mapping.use_min
-        or mapping.use_max
-        or (mapping.mapping_x, mapping.mapping_y, mapping.mapping_z) != ("X", "Y", "Z")
-        or mapping.mapping != "FLAT"
-    )
-
-
-# --- Constants are evaluated at once, so that they can be told from what varies --------------------------------------
-
-_NOWHERE: Floats = np.zeros((1, 0))
-
-
-def _evaluated(light: Light) -> PlainLight:
-    red, green, blue = light.light_at(_NOWHERE)[0].tolist()
-    return PlainLight((_finite(red), _finite(green), _finite(blue)))
-
-
-def _scaled(light: Light, scale: tuple[float, ...], bias: tuple[float, ...]) -> Light:
-    if scale == (1.0, 1.0, 1.0) and bias == (0.0, 0.0, 0.0):
-        return light
-    scaled = Scaled(light, (scale[0], scale[1], scale[2]), (bias[0], bias[1], bias[2]))
-    return _evaluated(scaled) if isinstance(light, PlainLight) else scaled
-
-
-def _weighted(light: Light, weights: tuple[float, float, float]) -> Value:
-    weighted = Weighted(light, weights)
-    return Constant(float(weighted.value_at(_NOWHERE)[0])) if isinstance(light, PlainLight) else weighted
-
-
-def _arithmetic(operation: Operation, first: Value, second: Value, clamp: bool = False) -> Value:
-    value = Arithmetic(operation, first, second, clamp)
-    constant = isinstance(first, Constant) and isinstance(second, Constant)
-    return Constant(_finite(float(value.value_at(_NOWHERE)[0]))) if constant else value
-
-
-def _clamped(value: Value) -> Value:
-    """To [0, 1]."""
-    return _arithmetic("add", value, Constant(0.0), clamp=True)
-
-
-def _product(first: Value, second: Value) -> Value:
-    return first if isinstance(second, Constant) and second.number == 1 else _arithmetic("multiply", first, second)

@@ -10,11 +10,11 @@ import bpy
 
 from ...metric.errors import MeshError
 from ...metric.texture import ImageFacts, Material
-from ..baking.emission import color_of
+from .expressions import plain_color
 from .images import TextureCache, black_warnings
-from .node_graph import NotReadError, node_count, outputs, surface_of, upstream, uses_nodes
-from .node_reader import FIRST_ROLES, Reader, plain_color
-from .types import Layer, Look, Reading, Unread
+from .node_graph import NotReadError, color_of, node_count, outputs, surface_of, upstream, uses_nodes
+from .node_reader import FIRST_ROLES, MaterialReader
+from .types import Look, MeshLayer, Reading, Unread
 
 DEFAULT_GREY = 0.8  # linear base color that Blender gives a surface without a material
 MOST_NODES = 100_000  # of a material; renderers copy groups as often as they are used
@@ -38,7 +38,7 @@ def _read_look(material: bpy.types.Material | None, cache: TextureCache, reading
     if reading.texture is not None:
         name = "" if material is None else material.name
         given = Material(name, reading.texture, how="given", uv=0)
-        return Look(given, (Layer("uv", ""),), black_warnings("the image that is given", reading.texture.pixels))
+        return Look(given, (MeshLayer("uv", ""),), black_warnings("the image that is given", reading.texture.pixels))
     if material is None:
         grey = plain_color((DEFAULT_GREY,) * 3)
         return Look(Material("", grey, how="none"), (), ("there is no material; Blender's default grey is taken",))
@@ -52,7 +52,7 @@ def _read_look(material: bpy.types.Material | None, cache: TextureCache, reading
             f"material {material.name} has more than {MOST_NODES:,} nodes, those of groups counted as often as they "
             "are used; simplify it or bake it to an image"
         )
-    reader = Reader(material, surface, cache, reading)
+    reader = MaterialReader(material, surface, cache, reading)
     try:
         color, alpha = reader.look()
     except NotReadError as error:

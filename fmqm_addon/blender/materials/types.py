@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What reading a material is asked for, and what comes of it."""
+"""How materials are read, and what a read one is made of."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Literal
 
+from ...comparison.surface_facts import Fact
+from ...metric.errors import SettingsError
 from ...metric.texture import ImageFacts, Material, Texture
 from ..access import ANYWHERE, Access
-from .image_headers import DEFAULT_LIMITS, Limits
+from .image_headers import DEFAULT_LIMITS, ImageLimits
 
 MAX_BAKE = 16384  # pixels a side
 
@@ -23,17 +25,29 @@ class Reading:
         stand_in: a missing base-color image is shown in magenta, as Blender shows it, instead of being an error.
         limits: of the images.
         access: which files the asset may name.
+
+    Raises:
+        SettingsError: bake is not between 0 and MAX_BAKE.
     """
 
     texture: Texture | None = None
     bake: int = 1024
     stand_in: bool = False
-    limits: Limits = DEFAULT_LIMITS
+    limits: ImageLimits = DEFAULT_LIMITS
     access: Access = ANYWHERE
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.bake <= MAX_BAKE:
+            raise SettingsError(f"bake is {self.bake}; it must be between 0 and {MAX_BAKE}")
+
+    @property
+    def facts(self) -> tuple[Fact, ...]:
+        """What a trust report says of it: facts that are known before a pair is compared."""
+        return (Fact("baked_at", self.bake, "pixels a side of what is baked; 0 forbids it"),)
 
 
 @dataclass(frozen=True)
-class Layer:
+class MeshLayer:
     """What a material wants of a mesh: a UV map (2 channels of MeshArrays.corners) or a color attribute (4, linear
     RGBA). The name "" is the mesh's one that is active for rendering."""
 
@@ -57,7 +71,7 @@ class Look:
     """
 
     material: Material
-    layers: tuple[Layer, ...]
+    layers: tuple[MeshLayer, ...]
     warnings: tuple[str, ...] = ()
 
 

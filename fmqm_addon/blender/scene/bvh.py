@@ -11,6 +11,7 @@ from mathutils.bvhtree import BVHTree
 
 from ...metric.errors import MeshError
 from ...metric.geometry import Floats, Ints
+from .. import arrays
 
 
 class BVHQuery:
@@ -40,6 +41,7 @@ class BVHQuery:
         return np.array(found, np.int64)
 
     def first_hit(self, origins: Floats, directions: Floats) -> tuple[Ints, Floats]:
+        """As SurfaceQuery.first_hit."""
         cast = self._tree.ray_cast
         triangles, distances = [], []
         for origin, direction in zip(_tuples(origins), _tuples(directions), strict=True):
@@ -62,12 +64,8 @@ def _build_tree(vertices: Floats, triangles: Ints) -> BVHTree:
     mesh = bpy.data.meshes.new("FMQM tree")
     try:
         mesh.vertices.add(len(vertices))
-        # Through the attributes these are copies of memory; through vertices and loops a hundred times slower.
-        mesh.attributes["position"].data.foreach_set("vector", vertices.astype(np.float32).ravel())
-        mesh.loops.add(triangles.size)
-        mesh.attributes[".corner_vert"].data.foreach_set("value", triangles.astype(np.int32).ravel())
-        mesh.polygons.add(len(triangles))
-        mesh.polygons.foreach_set("loop_start", np.arange(0, triangles.size, 3, dtype=np.int32))
+        arrays.write(mesh.attributes["position"].data, "vector", vertices.astype(np.float32))
+        arrays.add_triangles(mesh, triangles.astype(np.int32))
         owner = bpy.data.objects.new("FMQM tree", mesh)
         try:
             return BVHTree.FromObject(owner, bpy.context.evaluated_depsgraph_get(), deform=False)

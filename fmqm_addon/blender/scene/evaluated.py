@@ -42,17 +42,17 @@ class Shown:
 
     @property
     def made(self) -> bool:
-        """An instance of a mesh that is no object's own: modifiers made it, or the owner is no mesh."""
+        """Whether it is an instance of a mesh that is no object's own: modifiers made it, or the owner is no mesh."""
         return self.instance and self.object.original == self.owner.object.original
 
     @property
     def edited(self) -> bool:
-        """In edit mode, as a mesh of its own."""
+        """Whether it is in edit mode, as a mesh of its own."""
         return self.object.mode == "EDIT" and self.object.original.type == "MESH" and not self.made
 
     @property
     def name(self) -> str:
-        """As the user knows it: the owner may be evaluated by way of a duplicate."""
+        """Its name as the user knows it: the owner may be evaluated by way of a duplicate."""
         own = self.object.original == self.owner.object.original
         return self.owner.original.name if own else self.object.name
 

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...metric.geometry import Floats
-from ..materials.images import image_paths
+from ..materials.image_files import image_paths
 from .members import collection_members, instanced, metaball_family
 from .target import Target
 

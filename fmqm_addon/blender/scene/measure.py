@@ -7,17 +7,19 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from ...comparison.alignment import Placed, Placement, place_counts
+from ...comparison.alignment import Alignment, AssetMesh, location_counts
 from ...comparison.attribution import Attribution
 from ...comparison.measurement import Comparison
-from ...comparison.pair import Answer, Question, answering, measurement_of
+from ...comparison.pair import PairOptions, PairResult, comparing_pair, measurement_of
 from ...comparison.trust import Trust
 from ...metric.errors import FMQMError
 from ...metric.evaluation import Scores
 from ...metric.stepper import Progress, Stepper, Work, as_part
 from ..materials.images import TextureCache
 from ..materials.types import Reading
+from .bvh import BVHQuery
 from .fingerprint import fingerprint
+from .mesh_arrays import AS_FOUND
 from .target import Target, bakes, take
 
 _READING = 0.05  # share of the whole that reading the scene takes, about
@@ -29,7 +31,7 @@ class Outcome:
 
     Attributes:
         reference_target, target: what was asked for.
-        answer: None where there is an error.
+        pair_result: None where there is an error.
         triangles, reference_triangles: counts after triangulation, before anything is left out.
         seconds: by report.records.STAGES; reading and preparing the reference count in the first outcome.
         fingerprint: of reference and compared, as they were when they were read.
@@ -38,7 +40,7 @@ class Outcome:
 
     reference_target: Target
     target: Target
-    answer: Answer | None = None
+    pair_result: PairResult | None = None
     triangles: int = 0
     reference_triangles: int = 0
     seconds: dict[str, float] = field(default_factory=dict)
@@ -48,7 +50,7 @@ class Outcome:
     @property
     def comparison(self) -> Comparison | None:
         """Scores, patches, samples and fields; None where there is an error."""
-        return None if self.answer is None else self.answer.comparison
+        return None if self.pair_result is None else self.pair_result.comparison
 
     @property
     def scores(self) -> Scores | None:
@@ -63,23 +65,24 @@ class Outcome:
     @property
     def reverse(self) -> Scores | None:
         """Scores of the other direction; None where they were not asked for, or there is an error."""
-        return None if self.answer is None else self.answer.reverse
+        return None if self.pair_result is None else self.pair_result.reverse
 
     @property
     def attribution(self) -> Attribution | None:
         """Whose loss it is; None where that was not asked for, or there is an error."""
-        return None if self.answer is None else self.answer.attribution
+        return None if self.pair_result is None else self.pair_result.attribution
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What should be known before the scores are believed."""
-        return () if self.answer is None else self.answer.warnings
+        return () if self.pair_result is None else self.pair_result.warnings
 
 
 def measuring(
     reference: Target,
     compared: Sequence[Target],
-    asked: Question,
+    options: PairOptions,
+    reading: Reading = AS_FOUND,
     finished: Callable[[Outcome], None] = lambda _: None,
 ) -> Stepper[list[Outcome]]:
     """A stepper over reading, preparing and comparing.
@@ -88,26 +91,31 @@ def measuring(
     An asset that fails has its error in its outcome and does not stop the others.
 
     Args:
+        reading: how the materials are read.
         finished: gets each outcome as soon as it is there.
     """
-    return Stepper(_work(reference, compared, asked, finished))
+    return Stepper(_work(reference, compared, options, reading, finished))
 
 
 def _work(
-    reference: Target, compared: Sequence[Target], asked: Question, finished: Callable[[Outcome], None]
+    reference: Target,
+    compared: Sequence[Target],
+    options: PairOptions,
+    reading: Reading,
+    finished: Callable[[Outcome], None],
 ) -> Work[list[Outcome]]:
     # Read all, then measure: the user may go on working meanwhile.
     read = []
     for index, target in enumerate((reference, *compared)):
-        item = yield from _read(target, asked.reading, _READING * index / (len(compared) + 1))
+        item = yield from _read(target, reading, _READING * index / (len(compared) + 1))
         read.append(item)
     share = (1 - _READING) / (len(compared) + 1)
     outcomes: list[Outcome] = []
     original, rest = read[0], read[1:]
     shared = {"load": original.seconds}
     error, measurement = original.error, None
-    if original.placed is not None:
-        measurement = measurement_of(original.placed, asked)
+    if original.asset is not None:
+        measurement = measurement_of(original.asset, BVHQuery, options)
         preparing = measurement.prepare()
         try:
             yield from as_part(preparing, _READING, share, f"Preparing {reference.label}")
@@ -117,19 +125,19 @@ def _work(
     for index, item in enumerate(rest):
         outcome = Outcome(reference, item.target, error=error or item.error)
         seconds = _added(shared if index == 0 else {}, {"load": item.seconds})
-        if measurement is not None and original.placed is not None and item.placed is not None:
+        if measurement is not None and original.asset is not None and item.asset is not None:
             began = _READING + share * (index + 1)
-            stepper = answering(measurement, original.placed, item.placed, asked)
+            stepper = comparing_pair(measurement, original.asset, item.asset, options, reading.facts)
             try:
-                answer = yield from as_part(stepper, began, share, f"Measuring {item.target.label}")
+                result = yield from as_part(stepper, began, share, f"Measuring {item.target.label}")
                 seconds = _added(seconds, stepper.seconds)
                 outcome = Outcome(
                     reference,
                     item.target,
-                    answer,
-                    triangles=len(item.placed.mesh.triangles),
-                    reference_triangles=len(original.placed.mesh.triangles),
-                    fingerprint=(original.mark(answer.placement), item.mark(answer.placement)),
+                    result,
+                    triangles=len(item.asset.mesh.triangles),
+                    reference_triangles=len(original.asset.mesh.triangles),
+                    fingerprint=(original.mark(result.alignment), item.mark(result.alignment)),
                     seconds={**seconds, "total": sum(seconds.values())},
                 )
             except FMQMError as reason:
@@ -142,13 +150,13 @@ def _work(
 @dataclass(frozen=True)
 class _Read:
     target: Target
-    placed: Placed | None
-    marks: tuple[str, str]  # fingerprints, by whether the place counts
+    asset: AssetMesh | None
+    marks: tuple[str, str]  # fingerprints, by whether the location counts
     seconds: float
     error: str | None
 
-    def mark(self, placement: Placement) -> str:
-        return self.marks[place_counts(placement.label)]
+    def mark(self, alignment: Alignment) -> str:
+        return self.marks[location_counts(alignment.label)]
 
 
 def _read(target: Target, reading: Reading, done: float) -> Work[_Read]:
@@ -158,13 +166,13 @@ def _read(target: Target, reading: Reading, done: float) -> Work[_Read]:
     baked = bakes(target, reading, cache)
     if baked:
         yield Progress(f"Reading {target.label}: baking {', '.join(baked)}", done)
-    placed, error = None, None
+    asset, error = None, None
     try:
-        placed = take(target, reading, cache)
+        asset = take(target, reading, cache)
     except FMQMError as reason:
         error = str(reason)
     marks = (fingerprint(target, False), fingerprint(target, True))
-    return _Read(target, placed, marks, time.perf_counter() - began, error)
+    return _Read(target, asset, marks, time.perf_counter() - began, error)
 
 
 def _added(a: dict[str, float], b: dict[str, float]) -> dict[str, float]:

@@ -8,34 +8,43 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from itertools import zip_longest
-from typing import Any
 
 import bpy
 import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
+from ...comparison.alignment import moved
 from ...metric.errors import MeshError, one_line
 from ...metric.geometry import Floats
 from ...metric.surface import MeshArrays, join_meshes
 from ...metric.texture import Material
+from .. import arrays
 from ..baking.bake import Baked, bake_slots, copy_properties
 from ..limits import MAX_TRIANGLES
 from ..materials.expressions import Encoded, VertexColor
-from ..materials.images import DARKEST, TextureCache
+from ..materials.images import TextureCache
 from ..materials.read_material import plain_look, read_look
-from ..materials.types import Layer, Look, Reading, Unread
+from ..materials.types import Look, MeshLayer, Reading, Unread
 from .evaluated import Evaluated, Shown, evaluated, shown
 from .members import disabled_when_instanced, instanced
+from .mesh_layers import (
+    Rows,
+    Triangles,
+    layer_values,
+    look_on_mesh,
+    missing_warning,
+    range_warnings,
+    rows_by_slot,
+    triangulated,
+)
 
 AS_FOUND = Reading()  # with the images that the file names, baking what must be
 _WORKING_SPACE = "Linear Rec.709"  # what plain colors and color attributes are taken to be in
-_MOST_BEYOND = 0.5  # of an attribute's values; a few bright ones may be meant
 _NAMED = 2  # of the objects that share a warning
 # What scans have: colors, and no material.
-_VERTEX_COLORS = Look(Material("", Encoded(VertexColor(0)), how="none"), (Layer("color", ""),))
+_VERTEX_COLORS = Look(Material("", Encoded(VertexColor(0)), how="none"), (MeshLayer("color", ""),))
 
-_Rows = NDArray[np.intp] | slice  # of triangles; a slice where it is all of them
 _Key = tuple[int, ...]
 
 
@@ -59,7 +68,7 @@ def mesh_arrays(
     """
     cache = cache or TextureCache()
     shapes: dict[_Key, _Shape | None] = {}
-    places: list[_Place] = []
+    instances: list[_Instance] = []
     particles: Counter[str] = Counter()
     triangles = 0
     with evaluated(objects) as found, ExitStack() as temporary:
@@ -77,24 +86,24 @@ def mesh_arrays(
                 if triangles > MAX_TRIANGLES:
                     raise MeshError(f"{name}: its instances show more than {MAX_TRIANGLES:,} triangles; measure a part")
                 matrix = _relative(each.matrix, frame, each.name)
-                places.append(_Place(order[each.owner.original.as_pointer()], each.name, matrix, key))
-        remarks = _left_out(found)
+                instances.append(_Instance(order[each.owner.original.as_pointer()], each.name, matrix, key))
+        warnings = _left_out(found)
         parts = {key: _as_arrays(shape, reading) for key, shape in shapes.items() if shape is not None}
-    if not places:
+    if not instances:
         what = "the mesh has no faces" if objects else "no mesh in it"
         raise MeshError(f"{name}: {what}; a surface is wanted")
     # Blender lists instances in an order that depends on the file's.
-    places.sort(key=lambda place: (place.owner, place.name, place.matrix.ravel().tolist()))
-    remarks += [(place.name, warning) for place in places for warning in parts[place.shape].warnings]
-    remarks += [
+    instances.sort(key=lambda instance: (instance.owner, instance.name, instance.matrix.ravel().tolist()))
+    warnings += [(instance.name, warning) for instance in instances for warning in parts[instance.shape].warnings]
+    warnings += [
         (owner, f"{count} particle instances are left out; make them real to measure them")
         for owner, count in sorted(particles.items())
     ]
     space = getattr(getattr(bpy.data, "colorspace", None), "working_space", _WORKING_SPACE)  # none before 5.0
     if space != _WORKING_SPACE:
-        remarks.append((name, f"the file's working space is {space}; its colors are taken as {_WORKING_SPACE}"))
-    joined = join_meshes([_placed(parts[place.shape], place.matrix) for place in places], one_line(name))
-    return replace(joined, warnings=_told(remarks))
+        warnings.append((name, f"the file's working space is {space}; its colors are taken as {_WORKING_SPACE}"))
+    joined = join_meshes([moved(parts[instance.shape], instance.matrix) for instance in instances], one_line(name))
+    return replace(joined, warnings=_joined_warnings(warnings))
 
 
 def _left_out(objects: Sequence[Evaluated]) -> list[tuple[str, str]]:
@@ -129,11 +138,13 @@ def _is_unread(material: bpy.types.Material, data: bpy.types.ID, reading: Readin
         look = read_look(material, cache, reading)
     except MeshError:  # mesh_arrays says so, if a face has it
         return False
-    return isinstance(look, Unread) or (isinstance(data, bpy.types.Mesh) and isinstance(_on_mesh(data, look), Unread))
+    return isinstance(look, Unread) or (
+        isinstance(data, bpy.types.Mesh) and isinstance(look_on_mesh(data, look), Unread)
+    )
 
 
 @dataclass(frozen=True)
-class _Place:
+class _Instance:
     """Where a shape is shown: by which of the objects, under which name, (4, 4) to the wanted frame."""
 
     owner: int
@@ -154,7 +165,7 @@ class _Slot:
 
     material: bpy.types.Material | None
     look: Look | Unread
-    rows: _Rows
+    rows: Rows
     corners: NDArray[np.float32]
     warnings: tuple[str, ...]
 
@@ -181,14 +192,6 @@ class _Shape:
     slots: dict[int, _Slot]
 
 
-@dataclass(frozen=True)
-class _Triangles:
-    """How a mesh is cut: (T, 3) int32."""
-
-    loops: NDArray[np.int32]
-    vertices: NDArray[np.int32]
-
-
 def _key(each: Shown) -> _Key:
     """Equal for what has the same mesh and the same materials."""
     mesh = each.object.original if each.edited else each.object.data  # edit mode: modifiers are each object's own
@@ -207,10 +210,10 @@ def _read_shape(each: Shown, cache: TextureCache, reading: Reading, temporary: E
             return None
         if reading.texture is not None and not len(mesh.uv_layers):
             raise MeshError(f"{each.name}: the mesh has no UV map, which the given image needs; unwrap it first")
-        cut = _triangulated(mesh, each.name)
+        cut = triangulated(mesh, each.name)
         slots = {
             index: _read_slot(mesh, cut, rows, _slot_material(object_, index), cache, reading)
-            for index, rows in _rows_by_slot(mesh, cut).items()
+            for index, rows in rows_by_slot(mesh, cut).items()
         }
         made = None
         if reading.bake and each.made and any(isinstance(slot.look, Unread) for slot in slots.values()):
@@ -222,43 +225,12 @@ def _read_shape(each: Shown, cache: TextureCache, reading: Reading, temporary: E
             depsgraph=depsgraph,
             made=made,
             matrix=each.matrix,
-            positions=_attribute(mesh, "position", "vector", 3, np.float32),
+            positions=arrays.read_attribute(mesh, "position", "vector", 3, np.float32),
             triangles=cut.vertices,
             slots=slots,
         )
     finally:
         object_.to_mesh_clear()
-
-
-def _triangulated(mesh: bpy.types.Mesh, name: str) -> _Triangles:
-    """Raises MeshError where Blender, which trusts its meshes, would read beyond its arrays."""
-    corrupt = MeshError(f"{name}: its faces name corners or vertices that it has not; mesh.validate() mends that")
-    if ".corner_vert" not in mesh.attributes:
-        raise corrupt
-    vertex = _attribute(mesh, ".corner_vert", "value", 1, np.int32)[:, 0]
-    if vertex.min(initial=0) < 0 or vertex.max(initial=0) >= len(mesh.vertices):
-        raise corrupt
-    if len(vertex) == 3 * len(mesh.polygons):  # Blender's own triangles are slow to read
-        loops = np.arange(len(vertex), dtype=np.int32).reshape(-1, 3)
-    else:
-        starts = _read(mesh.polygons, "loop_start", (len(mesh.polygons),), np.int32)
-        if starts[0] != 0 or np.diff(starts, append=len(vertex)).min() < 3:
-            raise corrupt
-        loops = _read(mesh.loop_triangles, "loops", (len(mesh.loop_triangles), 3), np.int32)
-    return _Triangles(loops, vertex[loops])
-
-
-def _rows_by_slot(mesh: bpy.types.Mesh, cut: _Triangles) -> dict[int, _Rows]:
-    """The triangles of each slot that has faces."""
-    if "material_index" not in mesh.attributes:
-        return {0: slice(None)}
-    of_face = _attribute(mesh, "material_index", "value", 1, np.int32)[:, 0]
-    indices = np.unique(of_face).tolist()
-    if len(indices) == 1:
-        return {indices[0]: slice(None)}
-    if len(of_face) != len(cut.loops):  # some faces are more than one triangle
-        of_face = of_face[_read(mesh.loop_triangles, "polygon_index", (len(cut.loops),), np.int32)]
-    return {index: np.flatnonzero(of_face == index) for index in indices}
 
 
 def slot_materials(object_: bpy.types.Object) -> list[bpy.types.Material | None]:
@@ -280,8 +252,8 @@ def _slot_material(object_: bpy.types.Object, index: int) -> bpy.types.Material 
 
 def _read_slot(
     mesh: bpy.types.Mesh,
-    cut: _Triangles,
-    rows: _Rows,
+    cut: Triangles,
+    rows: Rows,
     material: bpy.types.Material | None,
     cache: TextureCache,
     reading: Reading,
@@ -290,83 +262,20 @@ def _read_slot(
         look: Look | Unread = _VERTEX_COLORS
     else:
         look = read_look(material, cache, reading)
-        look = _on_mesh(mesh, look) if isinstance(look, Look) else look
+        look = look_on_mesh(mesh, look) if isinstance(look, Look) else look
     warnings: list[str] = []
     values = [np.empty((*cut.loops[rows].shape, 0), np.float32)]
     layers = () if isinstance(look, Unread) else look.layers
     for layer in layers:
-        found = _layer_values(mesh, layer, cut, rows)
+        found = layer_values(mesh, layer, cut, rows)
         if found is None:
-            warnings.append(_missing(layer, material))
+            warnings.append(missing_warning(layer, material))
             found = np.zeros((len(values[0]), 3, layer.width), np.float32)
         elif layer.kind == "color" and len(layers) == 1:  # nothing else gives it color
-            warnings += _out_of_range(layer, found[:, :, :3])
+            warnings += range_warnings(layer, found[:, :, :3])
         values.append(found)
     corners = values[-1] if len(values) <= 2 else np.concatenate(values, axis=2)
     return _Slot(material, look, rows, corners, tuple(warnings))
-
-
-def _on_mesh(mesh: bpy.types.Mesh, look: Look) -> Look | Unread:
-    """A look, or what the baker has to make of it on this mesh."""
-    known = look.material.images, look.warnings
-    for layer in look.layers:
-        if _layer_of(mesh, layer) is not None:
-            continue
-        if layer.name in mesh.attributes:  # of any domain and type, as Geometry Nodes make them
-            return Unread(layer.name, "is an attribute of a kind that is not read", *known)
-        if layer.kind == "color" and look.material.alpha is not None:  # its alpha depends on the node that asks
-            return Unread(f"the color attribute {layer.name}".rstrip(), "is missing on the mesh", *known)
-    return look
-
-
-def _missing(layer: Layer, material: bpy.types.Material | None) -> str:
-    kind = {"uv": "UV map", "color": "color attribute"}[layer.kind]
-    named = f" named {layer.name}" if layer.name else ""
-    user = "its color" if material is None else f"material {material.name}"
-    return f"the mesh has no {kind}{named}, which {user} needs; taken as 0, as Blender renders it"
-
-
-def _out_of_range(layer: Layer, light: NDArray[np.float32]) -> list[str]:
-    """Of colors that an exporter wrote as other numbers than Blender reads them."""
-    named = f"the color attribute {layer.name}".rstrip()
-    if light.max() < DARKEST:
-        return [f"{named} is black all over; unless it is meant to be, export its colors as bytes, or from 0 to 1"]
-    beyond = np.mean(light > 1)
-    if beyond > _MOST_BEYOND:
-        return [f"{named} is beyond 1, and shown as 1, in {100 * beyond:.0f} % of its values; export them from 0 to 1"]
-    return []
-
-
-def _layer_values(mesh: bpy.types.Mesh, layer: Layer, cut: _Triangles, rows: _Rows) -> NDArray[np.float32] | None:
-    """(rows, 3, channels) of a layer at the triangles' corners; None if the mesh has no such layer."""
-    if layer.kind == "uv":
-        uv_map = _uv_map(mesh, layer.name)
-        return None if uv_map is None else _read(uv_map.uv, "vector", (len(mesh.loops), 2), np.float32)[cut.loops[rows]]
-    colors = _color_attribute(mesh, layer.name)
-    if colors is None:
-        return None
-    linear = _read(colors.data, "color", (len(colors.data), 4), np.float32)
-    return linear[(cut.loops if colors.domain == "CORNER" else cut.vertices)[rows]]
-
-
-def _layer_of(mesh: bpy.types.Mesh, layer: Layer) -> bpy.types.MeshUVLoopLayer | bpy.types.Attribute | None:
-    return _uv_map(mesh, layer.name) if layer.kind == "uv" else _color_attribute(mesh, layer.name)
-
-
-def _uv_map(mesh: bpy.types.Mesh, name: str) -> bpy.types.MeshUVLoopLayer | None:
-    """The named UV map; "" is the one active for rendering, or the first where none is."""
-    maps = mesh.uv_layers
-    if name:
-        return maps.get(name)
-    return next((each for each in maps if each.active_render), maps[0] if len(maps) else None)
-
-
-def _color_attribute(mesh: bpy.types.Mesh, name: str) -> bpy.types.Attribute | None:
-    """The named color attribute; "" is the one for rendering, or the first where none is."""
-    colors = mesh.color_attributes
-    if name:
-        return colors.get(name)
-    return colors[max(colors.render_color_index, 0)] if len(colors) else None
 
 
 def _as_arrays(shape: _Shape, reading: Reading) -> MeshArrays:
@@ -438,11 +347,6 @@ def _plain_look(material: bpy.types.Material, unread: Unread, why: str) -> Look:
     )
 
 
-def _placed(mesh: MeshArrays, matrix: Floats) -> MeshArrays:
-    with np.errstate(invalid="ignore", over="ignore"):  # coordinates that are no numbers are left out later
-        return replace(mesh, positions=mesh.positions @ matrix[:3, :3].T + matrix[:3, 3])
-
-
 def _relative(matrix: Floats, frame: Floats | None, name: str) -> Floats:
     """(4, 4) from the object to the frame; exactly the identity where the frame is the object's own."""
     if frame is None:
@@ -455,29 +359,15 @@ def _relative(matrix: Floats, frame: Floats | None, name: str) -> Floats:
         raise MeshError(f"{name}: its parent has a scale of zero; mend that transform") from error
 
 
-def _told(remarks: Iterable[tuple[str, str]]) -> tuple[str, ...]:
+def _joined_warnings(warnings: Iterable[tuple[str, str]]) -> tuple[str, ...]:
     """Names and what is to be said of them as warnings: what many share is said once."""
     names: dict[str, dict[str, None]] = {}
-    for name, remark in remarks:
-        names.setdefault(remark, {})[name] = None
-    return tuple(one_line(f"{_listed(list(those))}: {remark}") for remark, those in names.items())
+    for name, warning in warnings:
+        names.setdefault(warning, {})[name] = None
+    return tuple(one_line(f"{_listed(list(those))}: {warning}") for warning, those in names.items())
 
 
 def _listed(names: list[str]) -> str:
     """ "A", "A, B", or "A, B and 33 more"."""
     more = len(names) - _NAMED
     return ", ".join(names[:_NAMED]) + (f" and {more} more" if more > 0 else "")
-
-
-def _attribute(mesh: bpy.types.Mesh, name: str, key: str, width: int, dtype: type) -> NDArray[Any]:
-    """(N, width) of a built-in attribute: many times as fast as by Mesh.vertices, loops and polygons."""
-    data = mesh.attributes[name].data
-    return _read(data, key, (len(data), width), dtype)
-
-
-def _read(
-    collection: bpy.types.bpy_prop_collection, attribute: str, shape: tuple[int, ...], dtype: type
-) -> NDArray[Any]:
-    values: NDArray[Any] = np.empty(shape, dtype)
-    collection.foreach_get(attribute, values.reshape(-1))
-    return values

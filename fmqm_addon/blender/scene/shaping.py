@@ -11,7 +11,7 @@ from collections.abc import Iterable
 import bpy
 
 from ...metric.errors import MeshError
-from ..materials.images import image_header, image_path, reserve
+from ..materials.image_files import image_header, image_path, reserve
 
 # The ways from an object to what it is made of; not to its looks.
 _FOLLOWED = (

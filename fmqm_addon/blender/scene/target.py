@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from ...comparison.alignment import Placed
+from ...comparison.alignment import AssetMesh
 from ...metric.errors import MeshError
 from ...metric.geometry import Floats
 from ..materials.images import TextureCache
@@ -61,7 +61,7 @@ def target_of(block: bpy.types.Object | bpy.types.Collection, bare: bool = False
     return Target(OBJECT if isinstance(block, bpy.types.Object) else COLLECTION, block.name_full, bare)
 
 
-def take(target: Target, reading: Reading = AS_FOUND, cache: TextureCache | None = None) -> Placed:
+def take(target: Target, reading: Reading = AS_FOUND, cache: TextureCache | None = None) -> AssetMesh:
     """The asset's arrays, read from Blender; nothing stays behind.
 
     An object is itself with its instances. An empty is what hangs from it and what it instances, a collection is
@@ -77,15 +77,15 @@ def take(target: Target, reading: Reading = AS_FOUND, cache: TextureCache | None
     if block is None:
         raise MeshError(f"{target.name}: it is no longer in the file; choose another")
     if isinstance(block, bpy.types.Collection):
-        return placed(collection_members(block), target.label, reading, cache=cache)
+        return asset_mesh(collection_members(block), target.label, reading, cache=cache)
     if block.type == "EMPTY":
-        return placed(family_members(block), target.label, reading, block, cache)
+        return asset_mesh(family_members(block), target.label, reading, block, cache)
     check_object(block)
     if not block.users_scene:
         raise MeshError(f"{target.name}: it has been deleted from the scene; choose another")
     if target.bare:
         return _without_modifiers(block, target.label, reading, cache)
-    return placed([block], target.label, reading, block, cache)
+    return asset_mesh([block], target.label, reading, block, cache)
 
 
 def bakes(target: Target, reading: Reading, cache: TextureCache) -> tuple[str, ...]:
@@ -93,13 +93,13 @@ def bakes(target: Target, reading: Reading, cache: TextureCache) -> tuple[str, .
     return to_bake(target.members(), reading, cache)
 
 
-def placed(
+def asset_mesh(
     objects: Sequence[bpy.types.Object],
     name: str,
     reading: Reading = AS_FOUND,
     origin: bpy.types.Object | None = None,
     cache: TextureCache | None = None,
-) -> Placed:
+) -> AssetMesh:
     """Objects as one mesh in the frame of their origin.
 
     Args:
@@ -116,7 +116,7 @@ def placed(
         origin = next(iter(roots.values())) if len(roots) == 1 else None
     matrix = np.eye(4) if origin is None else _matrix_of(origin)
     check_shaping_images(objects)
-    return Placed(mesh_arrays(objects, name, reading, matrix, cache), matrix)
+    return AssetMesh(mesh_arrays(objects, name, reading, matrix, cache), matrix)
 
 
 def contains_surface(block: bpy.types.Object | bpy.types.Collection) -> bool:
@@ -126,14 +126,16 @@ def contains_surface(block: bpy.types.Object | bpy.types.Collection) -> bool:
     return is_measured(block) or (block.type == "EMPTY" and any(map(is_measured, block.children_recursive)))
 
 
-def _without_modifiers(object_: bpy.types.Object, label: str, reading: Reading, cache: TextureCache | None) -> Placed:
+def _without_modifiers(
+    object_: bpy.types.Object, label: str, reading: Reading, cache: TextureCache | None
+) -> AssetMesh:
     """By way of a duplicate of the object, on the same mesh."""
     if object_.mode == "EDIT":
         object_.update_from_editmode()
     duplicate = object_.copy()
     try:
         duplicate.modifiers.clear()
-        result = placed([duplicate], label, reading, duplicate, cache)
+        result = asset_mesh([duplicate], label, reading, duplicate, cache)
         warnings = tuple(w.replace(duplicate.name, object_.name, 1) for w in result.mesh.warnings)
         return replace(result, mesh=replace(result.mesh, warnings=warnings))
     except MeshError as error:

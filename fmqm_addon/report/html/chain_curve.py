@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
-from ..render import shorten
+from ..labels import shorten
 
 WIDTH, HEIGHT = 460, 270
 LEFT, RIGHT, TOP, BOTTOM = 44, 16, 28, 62  # margins; the lowest level's name stands above the axis' numbers

@@ -6,6 +6,8 @@ It needs no network and no server. Names come from strangers' files: every text 
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -18,8 +20,7 @@ import numpy as np
 
 from ...metric.geometry import Floats
 from ..atomic_files import write_parts
-from ..junit import below
-from ..records import SHOWN
+from ..records import SHOWN, below
 from ..trust_table import Report, trust_lines
 from ..visual.colormap import NO_PATCH, score_colors
 from .chain_curve import Level, curve_svg
@@ -27,8 +28,9 @@ from .chain_curve import Level, curve_svg
 PAGE = "index.html"
 MEGABYTE = 2**20
 MISSING = "–"
-# Nothing but what lies beside the page is ever loaded, whatever a name might hold.
-POLICY = "default-src 'none'; img-src 'self' file: data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
+# Only what lies beside the page is loaded, and only its own script runs, whatever a name might hold.
+POLICY = """default-src 'none'; base-uri 'none'; form-action 'none'; img-src 'self' file: data:;
+style-src 'unsafe-inline'; script-src 'sha256-{}'"""
 
 _TABLE = (
     '<section class="card scroll" tabindex="0" role="region" aria-label="All pairs"><table class="scores"><thead><tr>'
@@ -62,6 +64,8 @@ def write_page(
 def page_parts(records: Iterable[Record], settings: Mapping[str, Any], versions: Mapping[str, str]) -> Iterator[str]:
     """The text of the page; the arguments are those of write_page."""
     beside = Path(__file__).parent
+    script = (beside / "page.js").read_text(encoding="utf-8")  # all that stands between the tags, as the digest wants
+    policy = POLICY.format(base64.b64encode(hashlib.sha256(script.encode()).digest()).decode())
     folder = _folder_to_leave_out(records)
     overview = _overview(records, folder)
     yield f"""<!DOCTYPE html>
@@ -69,7 +73,7 @@ def page_parts(records: Iterable[Record], settings: Mapping[str, Any], versions:
 <head>
 <meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">
-<meta http-equiv="Content-Security-Policy" content="{POLICY}">
+<meta http-equiv="Content-Security-Policy" content="{policy}">
 <link rel="icon" href="data:,">
 <title>FMQM report</title>
 <style>
@@ -94,8 +98,7 @@ def page_parts(records: Iterable[Record], settings: Mapping[str, Any], versions:
         yield _pair(number, record, folder)
     yield f"""{_settings(settings, versions)}
 </main>
-<script>
-{(beside / "page.js").read_text(encoding="utf-8")}</script>
+<script>{script}</script>
 </body>
 </html>
 """
@@ -171,7 +174,7 @@ def _row(number: int, record: Record, folder: str | None) -> str:
 
 def _cell(value: float | None, shown: str) -> str:
     """A number of the table, with what it is sorted by."""
-    return f'<td class="number" data-value="{"" if value is None else value}">{shown}</td>'
+    return f'<td class="number" data-value="{"" if value is None else escape(str(value))}">{shown}</td>'
 
 
 def _score(record: Record, column: str) -> str:
@@ -229,8 +232,7 @@ def _pair(number: int, record: Record, folder: str | None) -> str:
     if record["warnings"]:
         items = "".join(f"<li>{_text(warning)}</li>" for warning in record["warnings"])
         parts.append(f'<ul class="warnings" aria-label="Warnings">{items}</ul>')
-    pictures = record.get("pictures")
-    if pictures:
+    if pictures := record.get("pictures"):
         parts.append(_views(name, pictures))
     if record["FMQM"] is not None:
         features = "".join(
@@ -306,7 +308,7 @@ def _close_ups(worst: Sequence[Record]) -> str:
 
 
 def _image(path: str, alt: str, size: tuple[int, int] | None = None) -> str:
-    sized = "" if size is None else f' width="{size[0]}" height="{size[1]}"'
+    sized = "" if size is None else ' width="{}" height="{}"'.format(*(escape(str(side)) for side in size))
     return f'<img src="{escape(quote(path))}" alt="{escape(alt)}"{sized} loading="lazy">'
 
 

@@ -29,7 +29,7 @@ from ..render import (
     score_by_face,
     three_views,
 )
-from ..visual.probe import patch_view, worst_patches
+from ..visual.worst import patch_view, worst_patches
 
 PICTURES = "pictures"  # the folder beside the page
 VIEW_AREA = 560**2  # pixels of a view of the whole

@@ -28,6 +28,7 @@ FIT_PERCENTILE = 99.0  # a fitted range of samples ends here: a few wild ones wo
 SIDE_NAMES = ("Outside both", "Inside both", "Inside reference only", "Inside compared only")
 _SIDE_COLORS = np.array([GREY_LIGHT, GREY_DARK, VERMILION, SKY])
 _TICKS = 5
+_CHUNK = 1 << 22  # elements of a distance table at once
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,7 @@ class Layer:
 
     @property
     def per_patch(self) -> bool:
+        """Whether it has one value for all of a patch."""
         return self.kind in (SCORE, NUMBER)
 
 
@@ -109,6 +111,7 @@ class Legend:
     note: str = ""
 
     def as_dict(self) -> dict[str, object]:
+        """Plain values for JSON."""
         return asdict(self)
 
 
@@ -239,3 +242,31 @@ def _number_text(span: float) -> Callable[[float], str]:
     """Numbers with as many decimals as tell the ticks of a span apart."""
     decimals = int(np.clip(np.ceil(-np.log10(max(span, 1e-12) / (_TICKS - 1))) + (span < 0.5), 2, 6))
     return lambda value: f"{value:.{decimals}f}"
+
+
+def blended_scores(result: Result, name: str) -> Floats:
+    """A layer that is per patch on the reference's surface, at the (V,) vertices of result.patch_mesh.
+
+    Scores go smoothly from patch to patch: a Gaussian mean of the patches around, by the distance to
+    their centers in their own size. For the number of the patch, it is the one that weighs most.
+    """
+    vertices = result.patch_mesh.vertices
+    scores = None if LAYERS[name].kind == NUMBER else result.patch_scores[:, COLUMNS.index(name)].astype(np.float32)
+    centers = result.patch_centers.astype(np.float32)
+    width = np.array([patch.diagonal for patch in result.patches], np.float32) / 4
+    values = np.empty(len(vertices))
+    step = max(1, _CHUNK // len(centers))
+    for first in range(0, len(vertices), step):
+        here = vertices[first : first + step].astype(np.float32)
+        squared = np.zeros((len(here), len(centers)), np.float32)
+        for k in range(3):
+            gap = here[:, k, None] - centers[:, k]
+            squared += gap * gap
+        squared /= 2 * width * width
+        if scores is None:
+            values[first : first + step] = squared.argmin(axis=1)
+            continue
+        squared -= squared.min(axis=1, keepdims=True)  # far from every center the nearest still counts
+        weight = np.exp(-squared)
+        values[first : first + step] = weight @ scores / weight.sum(axis=1)
+    return values

@@ -7,18 +7,11 @@ from typing import ClassVar
 
 import bpy
 
-from ...blender.scene.decimate import (
-    Found,
-    Reader,
-    Reduced,
-    Step,
-    Wish,
-    decimated_copy,
-    reducing,
-    scene_reader,
-)
+from ...blender.scene.bvh import BVHQuery
+from ...blender.scene.decimate import decimated_copy, scene_reader
 from ...blender.scene.fingerprint import fingerprint
 from ...blender.scene.target import target_of
+from ...comparison.decimation import DecimationGoal, DecimationResult, SearchResult, Step, VersionReader, decimating
 from ...metric.errors import FMQMError
 from ...metric.settings import Settings
 from ...metric.stepper import Stepper, Work
@@ -48,7 +41,7 @@ class FMQM_OT_decimate(SteppedOperator, bpy.types.Operator):  # noqa: N801
 
     def begin(self, context: bpy.types.Context) -> bool:
         fmqm, self._name = context.scene.fmqm, context.active_object.name_full
-        wish = Wish(
+        goal = DecimationGoal(
             (round(fmqm.decimate.target, 4),),  # a property is float32: 0.9 must not become 0.90000004
             fmqm.decimate.max_triangles if fmqm.decimate.limited else None,
         )
@@ -59,16 +52,16 @@ class FMQM_OT_decimate(SteppedOperator, bpy.types.Operator):  # noqa: N801
             return False
         context.view_layer.update()  # or a transform that is still to be applied would pass for a change
         self._scene, self._mark = context.scene.name_full, fingerprint(target_of(context.active_object), False)
-        self.stepper = Stepper(_attempt(scene_reader([self._name], self._name), wish, settings))
+        self.stepper = Stepper(_attempt(scene_reader([self._name], self._name), goal, settings))
         return True
 
     def finish(self, context: bpy.types.Context) -> set[str]:
         """The copy and the path it took, in one undo step."""
-        reduced = self.stepper.result
-        if isinstance(reduced, FMQMError):
-            self.report({"WARNING"}, str(reduced))
+        result = self.stepper.result
+        if isinstance(result, FMQMError):
+            self.report({"WARNING"}, str(result))
             return {"CANCELLED"}
-        found = reduced.outcomes[0].last
+        found = result.results[0].last
         original = next((object_ for object_ in bpy.data.objects if object_.name_full == self._name), None)
         scene = next((scene for scene in bpy.data.scenes if scene.name_full == self._scene), None)
         if original is None or scene is None:
@@ -99,7 +92,7 @@ class FMQM_OT_decimate(SteppedOperator, bpy.types.Operator):  # noqa: N801
             hidden = f"; {original.name} is hidden, Alt H shows it"
         self.report(
             {"INFO"},
-            f"{copy.name}: {best.triangles:,} of {reduced.triangles:,} triangles, FMQM {best.fmqm:.4f}{hidden}",
+            f"{copy.name}: {best.triangles:,} of {result.triangles:,} triangles, FMQM {best.fmqm:.4f}{hidden}",
         )
         return {"FINISHED"}
 
@@ -114,9 +107,9 @@ def _why_not(context: bpy.types.Context) -> str:
     return "" if active.mode == "OBJECT" else "Leave the object's edit or paint mode"
 
 
-def _attempt(read: Reader, wish: Wish, settings: Settings) -> Work[Reduced | FMQMError]:
+def _attempt(read: VersionReader, goal: DecimationGoal, settings: Settings) -> Work[DecimationResult | FMQMError]:
     """The search, or why it could not be done."""
-    searching = reducing(read, wish, settings)
+    searching = decimating(read, BVHQuery, goal, settings)
     try:
         while searching.step():
             yield searching.progress
@@ -125,7 +118,7 @@ def _attempt(read: Reader, wish: Wish, settings: Settings) -> Work[Reduced | FMQ
     return searching.result
 
 
-def _write_path(decimate: FMQMDecimate, name: str, found: Found) -> None:
+def _write_path(decimate: FMQMDecimate, name: str, found: SearchResult) -> None:
     """Its versions, from the most triangles down; "about" where few patches were looked at."""
     steps = sorted(found.path, key=lambda step: (-step.triangles, step.quick))
     lines = list(dict.fromkeys(map(_step_text, steps)))

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...blender.scene.measure import Outcome, measuring
 from ...blender.scene.target import target_of
-from ...comparison.pair import Question
+from ...comparison.pair import PairOptions
 from ...metric.errors import FMQMError
 from ...report.trust_table import trust_dict
 from .. import session, stale
@@ -74,7 +74,7 @@ class FMQM_OT_measure(SteppedOperator, bpy.types.Operator):  # noqa: N801
         self.stepper = measuring(
             target_of(reference_of(fmqm), fmqm.bare_reference),
             list(dict.fromkeys(compared)),
-            Question(settings, **asked, both=fmqm.settings.both, attribution=fmqm.settings.attribution),
+            PairOptions(settings, **asked, both=fmqm.settings.both, attribution=fmqm.settings.attribution),
         )
         return True
 
@@ -138,20 +138,20 @@ def _write_row(fmqm: FMQMScene, outcome: Outcome, settings_text: str) -> None:
     row.reverse = "" if outcome.reverse is None else numbers_text(outcome.reverse)
     row.attribution = "" if outcome.attribution is None else json.dumps(outcome.attribution.as_dict(), allow_nan=False)
     row.trust = "" if outcome.trust is None else json.dumps(trust_dict(outcome.trust), allow_nan=False)
-    answer, comparison = outcome.answer, outcome.comparison
-    row.space = "" if answer is None else answer.placement.label
+    result, comparison = outcome.pair_result, outcome.comparison
+    row.space = "" if result is None else result.alignment.label
     row.scores = "" if comparison is None else numbers_text(comparison.scores)
     row.stderr = "" if comparison is None or comparison.stderr is None else numbers_text(comparison.stderr)
     row.patches = 0 if comparison is None else len(comparison.result.patches)
     row.samples = 0 if comparison is None else len(comparison.result.samples.positions)
-    if answer is not None:
+    if result is not None:
         session.put(
             row.uid,
             session.Measured(
-                reference=answer.reference,
-                comparison=answer.comparison,
+                reference=result.reference,
+                comparison=result.comparison,
                 reference_to_world=np.eye(4),  # it is measured where it stands
-                distorted_to_world=answer.placement.to_world,
+                distorted_to_world=result.alignment.to_world,
             ),
         )
 

@@ -9,7 +9,7 @@ import bpy
 from bpy.props import EnumProperty
 
 from ...report.records import table_text
-from ..properties.rows import EXPLAINED, active_row, pair_of, row_scores
+from ..properties.rows import EXPLAINED, active_row, is_whole, pair_of, row_scores
 from ..view.shown import forget_removed
 
 
@@ -18,6 +18,11 @@ def has_rows(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
         cls.poll_message_set("Nothing has been measured yet")
         return False
     return True
+
+
+def broken_text(count: int) -> str:
+    """What to say of so many rows that were left out because they cannot be read."""
+    return f"; {count} left out, which cannot be read" if count else ""
 
 
 class FMQM_OT_sort_rows(bpy.types.Operator):  # noqa: N801
@@ -43,7 +48,11 @@ class FMQM_OT_sort_rows(bpy.types.Operator):  # noqa: N801
         fmqm = context.scene.fmqm
         chosen = active_row(context.scene)
         chosen_uid = chosen.uid if chosen else ""
-        values = {row.uid: scores[self.column] for row in fmqm.rows if (scores := row_scores(row)) is not None}
+        values = {
+            row.uid: scores[self.column]
+            for row in fmqm.rows
+            if (scores := row_scores(row)) is not None and is_whole(row)
+        }
         now = list(values)
         order = sorted(now, key=values.__getitem__, reverse=True)
         if order == now:
@@ -67,7 +76,8 @@ class FMQM_OT_remove_row(bpy.types.Operator):  # noqa: N801
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         fmqm = context.scene.fmqm
-        fmqm.rows.remove(fmqm.row_index)
+        if active_row(context.scene) is not None:
+            fmqm.rows.remove(fmqm.row_index)
         fmqm.row_index = max(0, min(fmqm.row_index, len(fmqm.rows) - 1))
         forget_removed()
         return {"FINISHED"}
@@ -101,9 +111,11 @@ class FMQM_OT_copy_results(bpy.types.Operator):  # noqa: N801
         return has_rows(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        context.window_manager.clipboard = table_text([pair_of(row) for row in context.scene.fmqm.rows])
-        number = len(context.scene.fmqm.rows)
-        self.report({"INFO"}, "1 result copied" if number == 1 else f"{number} results copied")
+        rows = [row for row in context.scene.fmqm.rows if is_whole(row)]
+        context.window_manager.clipboard = table_text([pair_of(row) for row in rows])
+        number = len(rows)
+        broken = broken_text(len(context.scene.fmqm.rows) - number)
+        self.report({"INFO"}, ("1 result copied" if number == 1 else f"{number} results copied") + broken)
         return {"FINISHED"}
 
 

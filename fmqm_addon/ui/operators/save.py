@@ -3,21 +3,20 @@
 
 from __future__ import annotations
 
-import json
 import os
 from typing import ClassVar
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
-from ... import VERSION
 from ...metric.errors import FMQMError
+from ...provenance import provenance
 from ...report.atomic_files import write_text
 from ...report.npz import save_fields
 from ...report.records import csv_text, json_text
-from .. import session
-from ..properties.rows import active_row, pair_of
-from .results import has_rows
+from .. import session, stored_text
+from ..properties.rows import active_row, is_whole, pair_of
+from .results import broken_text, has_rows
 
 
 class FMQM_OT_save_results(bpy.types.Operator):  # noqa: N801
@@ -69,23 +68,28 @@ class FMQM_OT_save_results(bpy.types.Operator):  # noqa: N801
         row = active_row(context.scene) or fmqm.rows[0]
         path = bpy.path.abspath(self._with_suffix())
         # One file tells of one set of settings: scores at others do not compare.
-        rows = [other for other in fmqm.rows if other.settings == row.settings]
+        alike = [other for other in fmqm.rows if other.settings == row.settings]
+        rows = [other for other in alike if is_whole(other)]
         try:
             if self.file_format == "npz":
                 measured = session.get(row.uid)
                 if measured is None:
                     raise FMQMError(f"{row.name}: the samples are not in memory any more; measure again")
                 save_fields(path, measured.comparison.result)
+            elif not rows:
+                raise FMQMError(f"{row.name}: this result cannot be read; measure again")
             elif self.file_format == "csv":
                 write_text(path, csv_text([pair_of(other) for other in rows]))
             else:
-                versions = {"fmqm_version": VERSION, "blender_version": bpy.app.version_string}
-                write_text(path, json_text([pair_of(other) for other in rows], json.loads(row.settings), versions))
+                settings = stored_text.read_settings(row.settings) or {}
+                versions = provenance(bpy.app.version_string)
+                write_text(path, json_text([pair_of(other) for other in rows], settings, versions))
         except FMQMError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        left_out = len(fmqm.rows) - len(rows)
-        tail = f"; {left_out} measured with other settings left out" if left_out and self.file_format != "npz" else ""
+        left_out = len(fmqm.rows) - len(alike)
+        tail = f"; {left_out} measured with other settings left out" if left_out else ""
+        tail = "" if self.file_format == "npz" else tail + broken_text(len(alike) - len(rows))
         self.report({"INFO"}, f"Saved {os.path.basename(path)}{tail}")
         return {"FINISHED"}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from ...comparison.alignment import PLACE_LABELS
+from ...comparison.alignment import SPACE_LABELS
 from ...metric.evaluation import COLUMNS
 from ...report.records import SHOWN
 from .. import session
@@ -24,7 +24,7 @@ from ..properties.scene import FMQMScene
 from .sidebar import Sidebar, wrapped
 
 _WIDE = 330  # pixels at scale 1: from here on the rows have room for the four features
-_SHORT_SPACE = {PLACE_LABELS["location"]: "Origins Aligned"}
+_SHORT_SPACE = {SPACE_LABELS["location"]: "Origins Aligned"}
 NOT_SEEN = "Normal maps, roughness and lighting are not part of FMQM"
 
 
@@ -42,7 +42,7 @@ class FMQM_UL_rows(bpy.types.UIList):  # noqa: N801
         _active_property: str,
     ) -> None:
         icon = "BLANK1"  # names stay in line
-        if row.error:
+        if row.error or row_scores(row) is None:
             icon = "CANCEL"
         elif row.uid in session.stale:
             icon = "FILE_REFRESH"
@@ -109,6 +109,7 @@ def _draw_row(layout: bpy.types.UILayout, context: bpy.types.Context, fmqm: FMQM
         return
     scores, stderr = row_scores(row), row_stderr(row)
     if scores is None:
+        wrapped(layout.box(), context, "This result cannot be read; measure again", icon="CANCEL")
         return
     if row.uid in session.stale:
         wrapped(layout, context, session.stale[row.uid], icon="FILE_REFRESH")
@@ -144,7 +145,7 @@ def _draw_row(layout: bpy.types.UILayout, context: bpy.types.Context, fmqm: FMQM
         split = column.split(factor=0.5, align=True)
         split.label(text=f"    {label}")
         split.label(text=text, translate=False)
-    if not all(comparable(row, other) for other in fmqm.rows if other.scores):
+    if not all(comparable(row, other) for other in fmqm.rows if row_scores(other)):
         wrapped(layout, context, "Scores in grey were measured at other settings: do not compare", icon="INFO")
     if attribution is not None:
         phrase = attribution["phrase"]

@@ -11,7 +11,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from ...blender.scene.decimate import LEAST_TRIANGLES
+from ...comparison.decimation import LEAST_TRIANGLES
 
 
 class FMQMDecimate(bpy.types.PropertyGroup):

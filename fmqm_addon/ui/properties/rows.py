@@ -16,10 +16,12 @@ from bpy.props import (
 )
 
 from ...blender.scene.target import Target
-from ...metric.evaluation import COLUMNS, Scores
+from ...metric.evaluation import Scores
 from ...metric.settings import PRESETS, SETTING_NAMES, Settings
-from ...report.records import SHOWN, PairScore
+from ...report.record_check import record_fault
+from ...report.records import SHOWN, PairScore, pair_record
 from ...report.trust_table import Report
+from .. import stored_text
 
 # What an artist should know of each number: label, and what a low value looks like.
 EXPLAINED = {
@@ -89,29 +91,27 @@ def row_targets(row: FMQMRow) -> tuple[Target, Target]:
 
 def row_scores(row: FMQMRow) -> dict[str, float] | None:
     """The five scores by the names of metric.evaluation.COLUMNS, in double precision; None for a row with an error."""
-    return _columns(row.scores)
+    return stored_text.read_columns(row.scores)
 
 
 def row_stderr(row: FMQMRow) -> dict[str, float] | None:
     """Standard errors of the scores over the seeds; None for one seed."""
-    return _columns(row.stderr)
+    return stored_text.read_columns(row.stderr)
 
 
 def row_reverse(row: FMQMRow) -> dict[str, float] | None:
     """Scores of the other direction, the compared as the reference; None where they were not measured."""
-    return _columns(row.reverse)
+    return stored_text.read_columns(row.reverse)
 
 
 def row_attribution(row: FMQMRow) -> dict[str, Any] | None:
     """Whose loss it is, as comparison.attribution.Attribution.as_dict has it; None where that was not measured."""
-    found: dict[str, Any] | None = json.loads(row.attribution) if row.attribution else None
-    return found
+    return stored_text.read_attribution(row.attribution)
 
 
 def row_trust(row: FMQMRow) -> Report | None:
     """The trust report of a row; None for a row with an error."""
-    report: Report | None = json.loads(row.trust) if row.trust else None
-    return report
+    return stored_text.read_trust(row.trust)
 
 
 def numbers_text(values: Any) -> str:
@@ -119,13 +119,11 @@ def numbers_text(values: Any) -> str:
     return json.dumps(np.asarray(values, np.float64).tolist())
 
 
-def _columns(text: str) -> dict[str, float] | None:
-    return dict(zip(COLUMNS, json.loads(text), strict=True)) if text else None
-
-
 def settings_name(row: FMQMRow) -> str:
     """The preset that a row was measured with, or Custom."""
     used = _settings_that_count(row)
+    if used is None:
+        return "?"
     for name, values in PRESETS.items():
         preset = Settings(**values).as_dict()
         if all(preset[each] == value for each, value in used.items()):
@@ -138,9 +136,24 @@ def comparable(row: FMQMRow, other: FMQMRow) -> bool:
     return row.settings == other.settings or _settings_that_count(row) == _settings_that_count(other)
 
 
-def _settings_that_count(row: FMQMRow) -> dict[str, Any]:
-    used = json.loads(row.settings)
-    return {name: used[name] for name in SETTING_NAMES if name != "seed"}
+def _settings_that_count(row: FMQMRow) -> dict[str, Any] | None:
+    used = stored_text.read_settings(row.settings)
+    return None if used is None else {name: used[name] for name in SETTING_NAMES if name != "seed"}
+
+
+def is_whole(row: FMQMRow) -> bool:
+    """Whether all that a row holds can be read; whoever sent the file may have written something else there."""
+    readers = (
+        (row.scores, stored_text.read_columns),
+        (row.stderr, stored_text.read_columns),
+        (row.reverse, stored_text.read_columns),
+        (row.attribution, stored_text.read_attribution),
+        (row.trust, stored_text.read_trust),
+        (row.settings, stored_text.read_settings),
+        (row.stages, stored_text.read_stages),
+    )
+    readable = stored_text.read_settings(row.settings) and all(read(text) is not None for text, read in readers if text)
+    return bool(readable) and not record_fault(pair_record(pair_of(row)))
 
 
 def pair_of(row: FMQMRow) -> PairScore:
@@ -154,7 +167,7 @@ def pair_of(row: FMQMRow) -> PairScore:
         stderr=_scores(row_stderr(row)),
         patches=row.patches or None,
         samples=row.samples or None,
-        seconds=json.loads(row.stages or "{}"),
+        seconds=stored_text.read_stages(row.stages) or {},
         warnings=tuple(row.warnings.splitlines()),
         error=row.error or None,
         space=row.space or None,

@@ -10,7 +10,8 @@ from ...blender.display import scene_objects, viewport
 from ...metric.errors import FMQMError
 from ...metric.evaluation import Result
 from ...metric.geometry import Floats
-from ...report.visual import layers, probe
+from ...report.visual import layers
+from ...report.visual.worst import patch_view
 from . import worst
 from .legends import explain
 from .result import POINT, UID, appear, look_of, measured_of, measured_row, world_length, world_matrix
@@ -93,7 +94,7 @@ def focus_patch(scene: bpy.types.Scene, area: bpy.types.Area | None) -> None:
     size = look.point_size * POINT * cloud[_SPACING]
     scene_objects.resize(cloud, size, result.samples.patch == patch)
     look.focused = True
-    center, diameter, normal = probe.patch_view(result, patch)
+    center, diameter, normal = patch_view(result, patch)
     matrix = world_matrix(measured, look.place)
     turned = np.linalg.inv(matrix[:3, :3]).T @ normal
     length = float(np.linalg.norm(turned))

@@ -6,7 +6,6 @@ Drawing computes nothing: legends are stored on the objects that they explain, a
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -22,6 +21,7 @@ from ...blender.display import scene_objects
 from ...metric.geometry import Floats
 from .. import session
 from ..properties.rows import active_row
+from ..stored_text import read_legend
 
 LEGEND = "fmqm_legend"  # custom property of the objects that have a legend: report.visual.layers.Legend as JSON
 _FONT = 0
@@ -92,8 +92,9 @@ def legends() -> list[dict[str, Any]]:
     shown: list[dict[str, Any]] = []
     for object_ in scene_objects.objects(bpy.context.scene):
         if LEGEND in object_ and object_.visible_get(viewport=space):
-            legend = json.loads(object_[LEGEND])
-            if legend not in shown:  # points and painted surface share theirs
+            text = object_[LEGEND]
+            legend = read_legend(text) if isinstance(text, str) else None
+            if legend is not None and legend not in shown:  # points and painted surface share theirs
                 shown.append(legend)
     return shown
 

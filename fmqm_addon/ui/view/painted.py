@@ -9,7 +9,8 @@ import numpy as np
 from ...blender.display import scene_objects, viewport
 from ...metric.fields import Fields
 from ...metric.geometry import Floats, Ints, cross
-from ...report.visual import layers, probe
+from ...report.visual import layers
+from ...report.visual.shells import fields_at
 from .. import session
 from .legends import explain
 from .result import UID, appear, look_of, measured_of, measured_row, world_length, world_matrix
@@ -54,7 +55,7 @@ def recolor_painted(scene: bpy.types.Scene) -> None:
     result, distorted = measured.comparison.result, measured.comparison.distorted
     length = world_length(measured)
     if layers.LAYERS[look.layer].per_patch:
-        values = probe.blended_scores(result, look.layer)
+        values = layers.blended_scores(result, look.layer)
     else:
         values = layers.field_values(look.layer, *_fields_of_vertices(painted[UID], measured), length)
     fitted_to = layers.layer_values(result, look.layer) if layers.LAYERS[look.layer].per_patch else values
@@ -70,7 +71,7 @@ def _fields_of_vertices(uid: str, measured: session.Measured) -> tuple[Fields, F
         _painted_fields.clear()
         vertices = measured.comparison.result.patch_mesh.vertices
         surfaces = (measured.reference, measured.comparison.distorted)
-        _painted_fields[uid] = (probe.fields_at(surfaces[0], vertices), probe.fields_at(surfaces[1], vertices))
+        _painted_fields[uid] = (fields_at(surfaces[0], vertices), fields_at(surfaces[1], vertices))
     return _painted_fields[uid]
 
 

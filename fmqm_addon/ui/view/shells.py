@@ -9,7 +9,8 @@ import bpy
 import numpy as np
 
 from ...blender.display import scene_objects, viewport
-from ...report.visual import layers, probe
+from ...report.visual import layers
+from ...report.visual.shells import SHELLS, fields_at, shell_points
 from . import overlay
 from .legends import length_text
 from .result import POINT, UID, appear, look_of, measured_row, world_length, world_matrix
@@ -30,7 +31,7 @@ def build_shells(scene: bpy.types.Scene) -> bpy.types.Object:
     uid, _, measured = measured_row(scene)
     look = look_of(scene)
     surface = measured.reference if look.shell_field == "REFERENCE" else measured.comparison.distorted
-    shells = probe.shell_points(surface, look.shell_points, look.shell_distance / 100)
+    shells = shell_points(surface, look.shell_points, look.shell_distance / 100)
     positions = shells.positions.copy()
     low, high = positions.min(axis=0), positions.max(axis=0)
     shown = np.ones(len(positions), bool)
@@ -38,8 +39,8 @@ def build_shells(scene: bpy.types.Scene) -> bpy.types.Object:
         positions[:, 0] += shells.shell * 1.1 * float(high[0] - low[0])
     else:  # each shell ends before the one below it, so that all five are seen
         place = (positions[:, 0] - low[0]) / max(float(high[0] - low[0]), 1e-12)
-        shown = place <= 1 - shells.shell / probe.SHELLS
-    colors = probe.fields_at(surface, shells.positions[shown]).ncf
+        shown = place <= 1 - shells.shell / SHELLS
+    colors = fields_at(surface, shells.positions[shown]).ncf
     area = float(measured.comparison.result.patch_mesh.area)
     object_ = scene_objects.build_cloud(
         scene,
@@ -55,7 +56,7 @@ def build_shells(scene: bpy.types.Scene) -> bpy.types.Object:
     scene_objects.recolor(object_, colors.astype(np.float64))
     step = world_length(measured) * look.shell_distance / 100
     legend = layers.Legend(
-        f"{probe.SHELLS} Shells of {surface.name}",
+        f"{SHELLS} Shells of {surface.name}",
         f"{length_text(scene, step)} apart",
         note="colors as in the textures",
     )

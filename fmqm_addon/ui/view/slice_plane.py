@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...blender.display import scene_objects, viewport
-from ...report.visual import layers, probe
+from ...report.visual import layers
+from ...report.visual.shells import fields_at, slice_points
 from .legends import explain
 from .result import UID, appear, look_of, measured_row, world_length, world_matrix
 
@@ -50,9 +51,9 @@ def draw_slice(scene: bpy.types.Scene) -> None:
     look = look_of(scene)
     resolution = plane.data.size[0]
     to_frame = np.linalg.inv(world_matrix(measured, "REFERENCE")) @ np.array(plane.matrix_world, np.float64)
-    points = probe.slice_points(to_frame, resolution)
-    ref = probe.fields_at(measured.reference, points)
-    dist = probe.fields_at(measured.comparison.distorted, points)
+    points = slice_points(to_frame, resolution)
+    ref = fields_at(measured.reference, points)
+    dist = fields_at(measured.comparison.distorted, points)
     length = world_length(measured)
     values = layers.field_values(look.slice_layer, ref, dist, length)
     ends = layers.value_range(look.slice_layer, values, look.range == "FITTED", length)

@@ -7,7 +7,8 @@ import bpy
 import numpy as np
 
 from ...blender.display import viewport
-from ...report.visual import probe
+from ...report.visual.shells import fields_at
+from ...report.visual.units import unit_grid, unit_lines, unit_of
 from . import overlay
 from .result import look_of, measured_row, world_matrix
 
@@ -23,19 +24,19 @@ def show_unit(scene: bpy.types.Scene, sample: int) -> None:
     uid, name, measured = measured_row(scene)
     result = measured.comparison.result
     sample %= len(result.samples.positions)
-    unit = probe.unit_of(result, sample)
+    unit = unit_of(result, sample)
     pictures = []
     for tangent in (False, True):
         for surface, fields in ((measured.reference, result.ref), (measured.comparison.distorted, result.dist)):
-            pixels, inside, dots, members = probe.unit_grid(result, unit, tangent, FIGURE_SIDE)
+            pixels, inside, dots, members = unit_grid(result, unit, tangent, FIGURE_SIDE)
             colors = np.zeros((FIGURE_SIDE * FIGURE_SIDE, 4), np.float32)
-            colors[inside, :3] = probe.fields_at(surface, pixels[inside]).ncf
+            colors[inside, :3] = fields_at(surface, pixels[inside]).ncf
             colors[inside, 3] = 1.0
             shape = (FIGURE_SIDE, FIGURE_SIDE, 4)
             pictures.append(overlay.UnitPicture(colors.reshape(shape), dots, fields.ncf[members].astype(np.float64)))
     look = look_of(scene)
     matrix = world_matrix(measured, look.place)
-    lines = probe.unit_lines(result, unit) @ matrix[:3, :3].T + matrix[:3, 3]
+    lines = unit_lines(result, unit) @ matrix[:3, :3].T + matrix[:3, 3]
     title = f"Sample {sample} of {name}"
     overlay.figure = overlay.UnitFigure(title, tuple(pictures), uid, scene.name, lines)  # type: ignore[arg-type]
     look.unit_sample = sample

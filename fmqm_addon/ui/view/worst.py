@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 from ...metric.evaluation import Result
-from ...report.visual import layers, probe
+from ...report.visual import layers
+from ...report.visual.worst import worst_patches
 from ..properties.view import FMQMLook
 
 WORST_COUNT = 20
@@ -25,7 +26,7 @@ def fill_worst(look: FMQMLook, result: Result, uid: str) -> None:
     if look.worst_uid == uid and len(look.worst):
         return
     look.worst.clear()
-    for worst in probe.worst_patches(result, WORST_COUNT):
+    for worst in worst_patches(result, WORST_COUNT):
         item = look.worst.add()
         item.name = f"Patch {worst.patch}"
         item.patch, item.score, item.value = worst.patch, worst.score, worst.value

@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A few pairs scored on a host of a cluster: tasks come in as JSON, lines of a journal go out.
+
+python -m fmqm_addon.batch.cluster_part < tasks > lines
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from .journal import Journal
+from .progress_log import Log
+from .rows import task_of
+from .workers import Limits, score_with_workers, workers_command
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def score_part(asked: Mapping[str, Any], out: BinaryIO) -> None:
+    """Scores in a watched worker, since a pair may end its process.
+
+    Args:
+        asked: "tasks" as Task.as_dict has them; "arguments" of the command line; "limits": fields of Limits; "made_by"
+            as the journal has it; "cwd": what relative paths are relative to. A host on which that is missing gets by
+            with absolute ones.
+    """
+    tasks = [task_of(plain) for plain in asked["tasks"]]
+    there = asked["cwd"] if os.path.isdir(asked["cwd"]) else None
+    with tempfile.TemporaryDirectory(prefix="fmqm-") as folder:
+        written = os.path.join(folder, "done.jsonl")
+        journal = Journal(written, made_by=asked["made_by"])
+        command = workers_command(str(ROOT / "scripts" / "score.py"), asked["arguments"])
+        log = Log("", len(tasks), len(tasks), silent=True)
+        score_with_workers(tasks, command, Path(folder) / "work", 1, Limits(**asked["limits"]), journal, log, there)
+        journal.close()
+        out.write(Path(written).read_bytes())
+
+
+if __name__ == "__main__":
+    score_part(json.load(sys.stdin), sys.stdout.buffer)
