@@ -30,7 +30,7 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
 def pytest_unconfigure(config: pytest.Config) -> None:
     """Ends the process here where bpy was loaded, since bpy 4.5 may wait forever at the end of Python.
 
-    The add-on's own life is not hidden by it: tests/.../test_addon.py starts processes that must end by themselves.
+    The add-on's own life is not hidden by it: tests/ui/test_addon.py starts processes that must end by themselves.
     What bpy 4.5 does without any of our code, and bpy 5.2 does not, is hang as long as something lives that was
     registered, which pytest may keep alive in a traceback or a cache:
 
