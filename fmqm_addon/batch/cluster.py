@@ -23,11 +23,10 @@ from typing import Any
 
 from ..metric.errors import FMQMError
 from ..report.record_check import checked_json
-from .cluster_part import ROOT
 from .journal import Journal, differences, own_record, parse_line
 from .progress_log import Log
 from .rows import Task, grouped
-from .workers import Limits
+from .workers import PACKAGE, Limits
 
 PAIRS_A_TASK = 4  # of one reference: few enough to spread and to lose
 RETRIES = 2  # of a task that fails; one whose worker is lost goes to another by Dask's own rule
@@ -41,6 +40,7 @@ _LOOK = 5.0  # seconds between looks at who is still there
 def score_on_cluster(
     tasks: Sequence[Task],
     address: str,
+    script: str,
     arguments: Sequence[str],
     limits: Limits,
     journal: Journal,
@@ -50,7 +50,8 @@ def score_on_cluster(
     """Scores all tasks into the journal, as they come.
 
     Args:
-        address: of the scheduler, such as tcp://scheduler:8786. arguments: of this command line.
+        address: of the scheduler, such as tcp://scheduler:8786.
+        script, arguments: as workers_command takes them.
         log: counts the pairs.
         wait: seconds for a first worker, and for another one when all are lost.
 
@@ -77,7 +78,8 @@ def score_on_cluster(
         pythons = _fit_workers(client, tasks[0], journal.made_by, log)
         if not pythons:
             raise FMQMError(f"--dask {address}: none of its workers can score")
-        asked = {"arguments": list(arguments), "limits": asdict(limits), "cwd": os.getcwd(), "made_by": journal.made_by}
+        asked = {"script": script, "arguments": list(arguments), "limits": asdict(limits)}
+        asked |= {"cwd": os.getcwd(), "made_by": journal.made_by}
         sent = _send(client, tasks, pythons, asked)
         _receive(distributed, client, sent, pythons, journal, log, wait)
     log.end()
@@ -122,7 +124,7 @@ def _lack(done: Any, made_by: Mapping[str, str], files: Sequence[str], sizes: Se
     try:
         found = checked_json(done.stdout.decode("utf-8", "replace").splitlines()[-1])
         if "no_fmqm" in found:
-            return f"no FMQM ({found['no_fmqm']}); start the workers with PYTHONPATH={ROOT}"
+            return f"no FMQM ({found['no_fmqm']}); start the workers with PYTHONPATH={PACKAGE.parent}"
         if "no_bpy" in found:
             return f"no bpy ({found['no_bpy']})"
         if difference := differences(found, made_by, ("fmqm_version", "fmqm_code", "blender_version")):

@@ -19,14 +19,13 @@ from .progress_log import Log
 from .rows import task_of
 from .workers import Limits, score_with_workers, workers_command
 
-ROOT = Path(__file__).resolve().parents[2]
-
 
 def score_part(asked: Mapping[str, Any], out: BinaryIO) -> None:
     """Scores in a watched worker, since a pair may end its process.
 
     Args:
-        asked: "tasks" as Task.as_dict has them; "arguments" of the command line; "limits": fields of Limits; "made_by"
+        asked: "tasks" as Task.as_dict has them; "script" and "arguments" as workers_command
+            takes them; "limits": fields of Limits; "made_by"
             as the journal has it; "cwd": what relative paths are relative to. A host on which that is missing gets by
             with absolute ones.
     """
@@ -35,7 +34,7 @@ def score_part(asked: Mapping[str, Any], out: BinaryIO) -> None:
     with tempfile.TemporaryDirectory(prefix="fmqm-") as folder:
         written = os.path.join(folder, "done.jsonl")
         journal = Journal(written, made_by=asked["made_by"])
-        command = workers_command(str(ROOT / "scripts" / "score.py"), asked["arguments"])
+        command = workers_command(asked["script"], asked["arguments"])
         log = Log("", len(tasks), len(tasks), silent=True)
         score_with_workers(tasks, command, Path(folder) / "work", 1, Limits(**asked["limits"]), journal, log, there)
         journal.close()

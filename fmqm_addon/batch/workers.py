@@ -29,6 +29,7 @@ from .journal import Journal, own_record, parse_line
 from .progress_log import Log
 from .rows import Task, grouped
 
+PACKAGE = Path(__file__).resolve().parents[1]
 NOTE = "note: "  # begins a line that a worker prints for this process's log
 WORKER = "FMQM_WORKER"  # set in the environment of workers
 TRIES = 2  # a pair that ends its worker is tried once more
@@ -338,11 +339,15 @@ def end_when_stuck(timeout: float) -> None:
 
 
 def workers_command(script: str, arguments: Sequence[str]) -> Command:
-    """This program once more: under Blender if we are, else in this Python.
+    """The command line of a worker: under the Blender program if this process is, else in this Python.
 
-    A worker's own arguments come first: after a -- among the others they would be names of files.
+    Args:
+        script: what a worker runs, a file of this package, from its folder. arguments: of the command line above it.
+            A worker's own arguments come first: after a -- among the others they would be names of files.
     """
     blender = sys.modules.get("bpy")
     program = blender.app.binary_path if blender is not None else ""
-    start = [program, "-b", "-q", "--python", script, "--"] if program else [sys.executable, script]
+    path = str(PACKAGE / script)
+    # -P: the script's folder is no place to import from.
+    start = [program, "-b", "-q", "--python", path, "--"] if program else [sys.executable, "-P", path]
     return lambda shard: [*start, "--worker", shard, *arguments]

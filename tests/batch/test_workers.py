@@ -18,8 +18,7 @@ from fmqm_addon.batch import workers
 from fmqm_addon.batch.journal import Journal, parse_line
 from fmqm_addon.batch.progress_log import Log
 from fmqm_addon.batch.rows import Row, Task
-from fmqm_addon.batch.workers import Command, Limits, adopt, journal_of, score_with_workers, workers_command
-from fmqm_addon.cli.process import WORKER
+from fmqm_addon.batch.workers import WORKER, Command, Limits, adopt, journal_of, score_with_workers, workers_command
 from fmqm_addon.metric.errors import FileError, FMQMError
 from fmqm_addon.report.records import SHOWN, PairScore, pair_record
 
@@ -114,14 +113,9 @@ def test_a_worker_starts_no_workers(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 
 def test_a_workers_own_arguments_come_before_a_double_dash() -> None:
-    assert workers_command("s.py", ["a.obj", "--", "-b.obj"])("S")[1:] == [
-        "s.py",
-        "--worker",
-        "S",
-        "a.obj",
-        "--",
-        "-b.obj",
-    ]
+    command = workers_command("cli/worker.py", ["a.obj", "--", "-b.obj"])("S")
+    assert command[-5:] == ["--worker", "S", "a.obj", "--", "-b.obj"]
+    assert Path(command[-6]) == ROOT / "fmqm_addon" / "cli" / "worker.py"
 
 
 def test_only_scores_are_adopted_and_only_new_ones(tmp_path: Path) -> None:

@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
+from fmqm_addon.cli.score import main
 from fmqm_addon.report.records import PairScore, pair_record
-from scripts.score import main
 
 HEAD = {"fmqm_version": "1", "fmqm_code": "c", "blender_version": "4", "settings": {}}
 

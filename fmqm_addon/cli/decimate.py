@@ -1,0 +1,253 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Find the fewest triangles, or the smallest textures, with which an asset still looks like itself.
+
+fmqm decimate REFERENCE --target-fmqm 0.9 -o out.glb
+python scripts/decimate.py REFERENCE --target-fmqm 0.9 -o out.glb
+blender -b -q --python scripts/decimate.py -- REFERENCE --chain 0.95,0.9,0.8 -o lods.glb
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO
+
+from ..batch.interrupt import stops_wait
+from ..batch.progress_log import Log
+from ..batch.scorer import REMEDIES
+from ..blender.access import Access
+from ..blender.materials.types import Reading
+from ..metric.errors import FMQMError, OutsideError, SettingsError, one_line
+from ..metric.settings import PRESETS, Settings
+from .process import FAILED, OK, prepare_bpy, run_script
+from .score import OneLineParser, add_access, check_access
+
+PROGRAM = "decimate.py"
+
+if TYPE_CHECKING:
+    from ..comparison.decimation import DecimationResult, SearchResult, Step, TargetResult
+
+
+def build_parser() -> OneLineParser:
+    parser = OneLineParser(
+        prog=PROGRAM,
+        description="The fewest triangles (Decimate, collapse) or the smallest textures whose FMQM is at or above a "
+        "target, found by bisection.",
+        epilog="With -o the versions that decide are scored as they are read back from such a file. Exit codes: 0 "
+        "found and written; 1 the target is missed even by the dearest version allowed, or a file cannot be read or "
+        "written; 2 wrong arguments.",
+        allow_abbrev=False,
+    )
+    parser.add_argument("reference", metavar="REFERENCE", help="the original, as for score.py")
+    parser.add_argument("--target-fmqm", type=float, metavar="X", help="fewest triangles with at least this FMQM")
+    parser.add_argument("--chain", type=_numbers, metavar="X,Y,...", help="the same for several targets, a file each")
+    parser.add_argument("--max-triangles", type=int, metavar="N", help="never more triangles than this")
+    parser.add_argument(
+        "--target-texture", type=float, metavar="X",
+        help="smallest textures (powers of two) with which the result still has at least this FMQM; after "
+        "--target-fmqm, of the decimated asset",
+    )  # fmt: skip
+    parser.add_argument("--preset", choices=PRESETS, default="paper", help="what decides; searching is always fast")
+    for name, text in (("samples", "number of samples"), ("patches", "number of patches"), ("seed", "random draws")):
+        parser.add_argument(f"--{name}", type=int, metavar="N", help=f"{text} (default: {getattr(Settings(), name)})")
+    parser.add_argument(
+        "-o", "--output", metavar="FILE",
+        help=".glb .obj .ply .stl .fbx .usd, plain meshes as they are measured, without skeletons, shape keys and "
+        "animation; or .blend, which keeps these and the modifier live; of a chain NAME_LOD1 and so on",
+    )  # fmt: skip
+    add_access(parser)
+    parser.add_argument("--json", metavar="FILE", help="targets, versions and paths; - is stdout")
+    parser.add_argument("--quiet", action="store_true", help="no progress on stderr")
+    return parser
+
+
+def _numbers(text: str) -> list[float]:
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text} is no list of numbers such as 0.95,0.9,0.8") from error
+
+
+def main(argv: Sequence[str], out: TextIO) -> int:
+    """Searches as the arguments say, and prints to out; returns the exit code."""
+    parser = build_parser()
+    parser.out = out
+    args = parser.parse_args(argv)
+    try:
+        check_access(args)
+        settings = _settings(args)
+        targets = _targets(args)
+        log = Log(PROGRAM, 1, 1, args.quiet)
+        return _search(args, targets, settings, log, out)
+    except SettingsError as error:
+        parser.error(str(error))
+    except FMQMError as error:
+        log.say(f"{error}{REMEDIES.get(type(error), '') if isinstance(error, OutsideError) else ''}")
+        return FAILED
+
+
+def _settings(args: argparse.Namespace) -> Settings:
+    given = {name: getattr(args, name) for name in ("samples", "patches", "seed") if getattr(args, name) is not None}
+    return Settings(**(PRESETS[args.preset] | given))
+
+
+def _targets(args: argparse.Namespace) -> list[float]:
+    """Of the geometry; none where only the textures are to get smaller."""
+    if args.target_fmqm is not None and args.chain:
+        raise SettingsError("--target-fmqm and --chain are both given; give one of them")
+    targets = args.chain or ([] if args.target_fmqm is None else [args.target_fmqm])
+    wanted = [*targets, *([] if args.target_texture is None else [args.target_texture])]
+    if not wanted:
+        raise SettingsError("nothing is asked for; give --target-fmqm, --chain or --target-texture")
+    for target in wanted:
+        if not (math.isfinite(target) and 0 < target <= 1):
+            raise SettingsError(f"the target is {target}; it must be above 0 and at most 1")
+    if args.max_triangles is not None and not targets:
+        raise SettingsError("--max-triangles needs --target-fmqm or --chain")
+    return targets
+
+
+def _search(args: argparse.Namespace, targets: list[float], settings: Settings, log: Log, out: TextIO) -> int:
+    """Searches, prints, writes; Blender is imported only once the arguments are known to be good."""
+    prepare_bpy()
+    from ..blender.files.export import (
+        check_ending,
+        check_outputs,
+        file_reader,
+        save_version,
+        texture_sizes,
+        written_reader,
+    )
+    from ..blender.scene.bvh import BVHQuery
+    from ..comparison.decimation import DecimationGoal, decimating
+    from ..report.atomic_files import check_writable, print_parts, write_text
+
+    outputs = _output_names(args.output, targets if args.chain else [])
+    for path in outputs:
+        check_ending(path)
+    files = [*outputs, *([args.json] if args.json and args.json != "-" else [])]
+    for path in files:
+        check_writable(path)
+    reading = Reading(access=Access(args.untrusted, args.asset_root or ""))
+    if files:
+        check_outputs(args.reference, files, reading)
+    with stops_wait():
+        sizes = () if args.target_texture is None else tuple(texture_sizes(args.reference, reading))
+    goal = DecimationGoal(tuple(targets), args.max_triangles, args.target_texture, sizes)
+    written = written_reader(args.reference, outputs[0], reading) if outputs else None
+    stepper = decimating(file_reader(args.reference, reading), BVHQuery, goal, settings, written)
+    more = True
+    while more:
+        with stops_wait():
+            more = stepper.step()
+        log.show(stepper.progress.done, stepper.progress.stage)
+    log.end()
+
+    result = stepper.result
+    errors, warnings = [], list(result.warnings)
+    saved: list[str | None] = [None] * len(result.results)
+    for number, outcome in enumerate(result.results):
+        if not outcome.last.reached:
+            errors.append(f"{args.reference}: {_missed(outcome, args.max_triangles, args.output)}")
+        elif outputs:
+            try:
+                with stops_wait():
+                    warnings += save_version(args.reference, outcome.last.best.version, outputs[number], reading)
+                saved[number] = outputs[number]
+            except FMQMError as error:
+                errors.append(str(error))
+    document = _json_text(args.reference, settings, result, saved)
+    if args.json and args.json != "-":
+        write_text(args.json, document)
+    print_parts(out, [document if args.json == "-" else _table(result, saved)])
+    for line in (*(f"warning: {warning}" for warning in warnings), *errors):
+        log.say(line)
+    return FAILED if errors else OK
+
+
+def _output_names(output: str | None, chain: list[float]) -> list[str]:
+    """One, or for a chain NAME_LOD1 and so on."""
+    if output is None or not chain:
+        return [] if output is None else [output]
+    path = Path(output)
+    return [str(path.with_name(f"{path.stem}_LOD{number + 1}{path.suffix}")) for number in range(len(chain))]
+
+
+def _missed(outcome: TargetResult, max_triangles: int | None, output: str | None) -> str:
+    best, target = outcome.last.best, outcome.last.target
+    score = "nothing that could be measured" if best.fmqm is None else f"FMQM {best.fmqm:.4f}"
+    kind, remedy = "", "ask for less"
+    if max_triangles is not None and outcome.texture is None:
+        remedy += ", or allow more"
+    if output is not None:
+        kind = f" as {Path(output).suffix.lower()}"
+        remedy += ", or choose another kind of file, if this one does not hold its materials"
+    allowed = "all triangles" if max_triangles is None else f"the {max_triangles} triangles that are allowed"
+    if outcome.texture is not None:
+        allowed = "the textures as they are"
+    return f"the target {target:g} is missed even with {allowed}{kind} ({score}); {remedy}"
+
+
+def _table(result: DecimationResult, saved: Sequence[str | None]) -> str:
+    """The path of every search, then what was found and where it was written."""
+    rows = []
+    for outcome, path in zip(result.results, saved, strict=True):
+        for found in (outcome.geometry, outcome.texture):
+            if found is None:
+                continue
+            rows += [(f"{found.target:g}", *_cells(step), "fast" if step.quick else "") for step in found.path]
+            verdict = "found" if found.reached else "missed"
+            if path is not None and found is outcome.last:
+                verdict += f", written to {path}"
+            rows.append((f"{found.target:g}", *_cells(found.best), verdict))
+    rows.insert(0, ("target", "ratio", "triangles", "texture", "FMQM", ""))
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    return "".join(
+        "  ".join(cell.rjust(width) for cell, width in zip(row[:-1], widths, strict=False))
+        + f"  {one_line(row[-1])}".rstrip()
+        + "\n"
+        for row in rows
+    )
+
+
+def _cells(step: Step) -> tuple[str, str, str, str]:
+    texture = "-" if step.version.texture is None else str(step.version.texture)
+    return f"{step.version.ratio:.4f}", str(step.triangles), texture, "-" if step.fmqm is None else f"{step.fmqm:.4f}"
+
+
+def _json_text(reference: str, settings: Settings, result: DecimationResult, saved: Sequence[str | None]) -> str:
+    document = {
+        "reference": reference,
+        "triangles": result.triangles,
+        "settings": settings.as_dict(),
+        "warnings": list(result.warnings),
+        "found": [
+            {"geometry": _found_dict(outcome.geometry), "texture": _found_dict(outcome.texture), "file": path}
+            for outcome, path in zip(result.results, saved, strict=True)
+        ],
+    }
+    return json.dumps(document, indent=2, allow_nan=False) + "\n"
+
+
+def _found_dict(found: SearchResult | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    return {
+        "target": found.target,
+        "reached": found.reached,
+        "best": _step_dict(found.best),
+        "below": None if found.below is None else _step_dict(found.below),
+        "path": [_step_dict(step) for step in found.path],
+    }
+
+
+def _step_dict(step: Step) -> dict[str, Any]:
+    return {**asdict(step.version), "triangles": step.triangles, "FMQM": step.fmqm, "fast": step.quick}
+
+
+if __name__ == "__main__":
+    run_script(main, __file__)
