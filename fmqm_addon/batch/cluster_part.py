@@ -36,7 +36,7 @@ def score_part(asked: Mapping[str, Any], out: BinaryIO) -> None:
         journal = Journal(written, made_by=asked["made_by"])
         command = workers_command(asked["script"], asked["arguments"])
         log = Log("", len(tasks), len(tasks), silent=True)
-        score_with_workers(tasks, command, Path(folder) / "work", 1, Limits(**asked["limits"]), journal, log, there)
+        score_with_workers(tasks, command, Path(folder), 1, Limits(**asked["limits"]), journal, log, there)
         journal.close()
         out.write(Path(written).read_bytes())
 
