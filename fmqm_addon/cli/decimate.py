@@ -23,8 +23,8 @@ from ..blender.access import Access
 from ..blender.materials.types import Reading
 from ..metric.errors import FMQMError, OutsideError, SettingsError, one_line
 from ..metric.settings import PRESETS, Settings
+from .arguments import OneLineParser, add_access, check_access
 from .process import FAILED, OK, prepare_bpy, run_script
-from .score import OneLineParser, add_access, check_access
 
 PROGRAM = "decimate.py"
 
@@ -32,9 +32,9 @@ if TYPE_CHECKING:
     from ..comparison.decimation import DecimationResult, SearchResult, Step, TargetResult
 
 
-def build_parser() -> OneLineParser:
+def build_parser(program: str) -> OneLineParser:
     parser = OneLineParser(
-        prog=PROGRAM,
+        prog=program,
         description="The fewest triangles (Decimate, collapse) or the smallest textures whose FMQM is at or above a "
         "target, found by bisection.",
         epilog="With -o the versions that decide are scored as they are read back from such a file. Exit codes: 0 "
@@ -42,6 +42,7 @@ def build_parser() -> OneLineParser:
         "written; 2 wrong arguments.",
         allow_abbrev=False,
     )
+    parser.set_defaults(program=program)
     parser.add_argument("reference", metavar="REFERENCE", help="the original, as for score.py")
     parser.add_argument("--target-fmqm", type=float, metavar="X", help="fewest triangles with at least this FMQM")
     parser.add_argument("--chain", type=_numbers, metavar="X,Y,...", help="the same for several targets, a file each")
@@ -72,16 +73,20 @@ def _numbers(text: str) -> list[float]:
         raise argparse.ArgumentTypeError(f"{text} is no list of numbers such as 0.95,0.9,0.8") from error
 
 
-def main(argv: Sequence[str], out: TextIO) -> int:
-    """Searches as the arguments say, and prints to out; returns the exit code."""
-    parser = build_parser()
+def main(argv: Sequence[str], out: TextIO, program: str = PROGRAM) -> int:
+    """Searches as the arguments say, and prints to out; returns the exit code.
+
+    Args:
+        program: the name that it was called by; usage and messages begin with it.
+    """
+    parser = build_parser(program)
     parser.out = out
     args = parser.parse_args(argv)
     try:
         check_access(args)
         settings = _settings(args)
         targets = _targets(args)
-        log = Log(PROGRAM, 1, 1, args.quiet)
+        log = Log(args.program, 1, 1, args.quiet)
         return _search(args, targets, settings, log, out)
     except SettingsError as error:
         parser.error(str(error))

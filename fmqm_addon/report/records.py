@@ -69,7 +69,7 @@ def table_text(pairs: Sequence[PairScore]) -> str:
 
 
 def json_parts(
-    records: Iterable[Mapping[str, Any]], settings: Mapping[str, Any], versions: Mapping[str, str]
+    records: Iterable[Mapping[str, Any]], settings: Mapping[str, Any], versions: Mapping[str, Any]
 ) -> Iterator[str]:
     """The text of a document, record after record: however many there are, one is in memory."""
     head = _json({**versions, "settings": settings, "pairs": []})
