@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from fmqm_addon.cli.process import require_bpy, take_stdout
+from fmqm_addon.cli.process import require_bpy, reserve_stdout
 from fmqm_addon.metric.errors import FMQMError
 from scripts.urn import Outline, build_urn, outline, paint_texture
 
@@ -101,7 +101,7 @@ def main() -> int:
     parser.add_argument("--only-build", action="store_true", help="build the two assets, do not score them")
     args = parser.parse_args()
     folder = args.out.resolve()
-    out = take_stdout()  # exporters print
+    out = reserve_stdout()  # exporters print
     try:
         folder.mkdir(parents=True, exist_ok=True)
         reference, lod = build_pair(folder)

@@ -25,14 +25,14 @@ from ..metric.errors import FMQMError
 from ..report.record_check import checked_json
 from .journal import Journal, differences, own_record, parse_line
 from .progress_log import Log
-from .rows import Task, grouped
+from .rows import Task, group_by_reference
 from .workers import PACKAGE, Limits
 
 PAIRS_A_TASK = 4  # of one reference: few enough to spread and to lose
 RETRIES = 2  # of a task that fails; one whose worker is lost goes to another by Dask's own rule
 WAIT = 30.0  # seconds for a first worker
 _CONNECT = 10.0  # seconds
-_ANSWER = 120.0  # seconds that a worker has to tell what it has: bpy comes over a network, perhaps
+_ANSWER = 120.0  # seconds that a worker has to answer the probe: bpy comes over a network, perhaps
 _POLL = 0.1  # seconds between looks at what is done
 _LOOK = 5.0  # seconds between looks at who is still there
 
@@ -75,20 +75,20 @@ def score_on_cluster(
             raise FMQMError(
                 f"--dask {address}: no worker within {wait:g} s; start some, or wait longer (--wait-workers)"
             ) from error
-        pythons = _fit_workers(client, tasks[0], journal.made_by, log)
+        pythons = _usable_workers(client, tasks[0], journal.made_by, log)
         if not pythons:
             raise FMQMError(f"--dask {address}: none of its workers can score")
-        asked = {"script": script, "arguments": list(arguments), "limits": asdict(limits)}
-        asked |= {"cwd": os.getcwd(), "made_by": journal.made_by}
-        sent = _send(client, tasks, pythons, asked)
+        request = {"script": script, "arguments": list(arguments), "limits": asdict(limits)}
+        request |= {"cwd": os.getcwd(), "made_by": journal.made_by}
+        sent = _send(client, tasks, pythons, request)
         _receive(distributed, client, sent, pythons, journal, log, wait)
     log.end()
 
 
-def _fit_workers(client: Any, first: Task, made_by: Mapping[str, str], log: Log) -> dict[str, list[str]]:
-    """The workers that can score, by their Python; of the others is told, a line a host, what they lack."""
-    asked = {"cwd": os.getcwd(), "files": [path for path in first.row.files() if path and os.path.isfile(path)]}
-    sizes = [os.stat(path).st_size for path in asked["files"]]
+def _usable_workers(client: Any, first: Task, made_by: Mapping[str, str], log: Log) -> dict[str, list[str]]:
+    """The workers that can score, by their Python; what the others lack is logged, a line a host."""
+    request = {"cwd": os.getcwd(), "files": [path for path in first.row.files() if path and os.path.isfile(path)]}
+    sizes = [os.stat(path).st_size for path in request["files"]]
     probe = (Path(__file__).parent / "probe.py").read_bytes()
     lacks: dict[str, dict[str, str]] = defaultdict(dict)
     pythons: dict[str, list[str]] = defaultdict(list)
@@ -101,7 +101,7 @@ def _fit_workers(client: Any, first: Task, made_by: Mapping[str, str], log: Log)
         answers: dict[str, Any] = client.run(
             asyncio.to_thread,
             subprocess.run,
-            [python, "-", json.dumps(asked)],
+            [python, "-", json.dumps(request)],
             input=probe,
             capture_output=True,
             timeout=_ANSWER,
@@ -109,7 +109,7 @@ def _fit_workers(client: Any, first: Task, made_by: Mapping[str, str], log: Log)
             on_error="return",
         )
         for worker, done in answers.items():
-            if lack := _lack(done, made_by, asked["files"], sizes):
+            if lack := _lack(done, made_by, request["files"], sizes):
                 lacks[_host(worker)][worker] = lack
             else:
                 pythons[python].append(worker)
@@ -135,22 +135,24 @@ def _lack(done: Any, made_by: Mapping[str, str], files: Sequence[str], sizes: Se
             if size != wanted:
                 return f"{path} is another file, of {size} bytes instead of {wanted}"
     except (AttributeError, IndexError, KeyError, TypeError, ValueError):
-        words = getattr(done, "stderr", b"").decode("utf-8", "replace").strip().splitlines()
-        return f"its Python does not answer ({words[-1] if words else repr(done)})"
+        lines = getattr(done, "stderr", b"").decode("utf-8", "replace").strip().splitlines()
+        return f"its Python does not answer ({lines[-1] if lines else repr(done)})"
     return ""
 
 
 _Sent = dict[Any, tuple[str, list[Task]]]  # by future: the Python that it was sent to, and its tasks
 
 
-def _send(client: Any, tasks: Sequence[Task], pythons: Mapping[str, Sequence[str]], asked: Mapping[str, Any]) -> _Sent:
+def _send(
+    client: Any, tasks: Sequence[Task], pythons: Mapping[str, Sequence[str]], request: Mapping[str, Any]
+) -> _Sent:
     """Parts of the tasks to workers that can score, spread over all of them."""
     turns = [python for python, workers in pythons.items() for _ in workers]
     sent: _Sent = {}
-    for group in grouped(tasks):
+    for group in group_by_reference(tasks):
         for first in range(0, len(group), PAIRS_A_TASK):
             part, python = group[first : first + PAIRS_A_TASK], turns[len(sent) % len(turns)]
-            text = json.dumps({**asked, "tasks": [task.as_dict() for task in part]})
+            text = json.dumps({**request, "tasks": [task.as_dict() for task in part]})
             future = client.submit(
                 subprocess.run,
                 [python, "-m", f"{__package__}.cluster_part"],
@@ -185,7 +187,7 @@ def _receive(
                 _take(future, part, journal, log)
         now = time.monotonic()
         if now - looked > _LOOK:
-            looked, there = now, set(_workers_there(client))
+            looked, there = now, set(_present_workers(client))
             for python, workers in pythons.items():
                 if there & set(workers):
                     lost.pop(python, None)
@@ -197,7 +199,7 @@ def _receive(
         time.sleep(_POLL)
 
 
-def _workers_there(client: Any) -> Sequence[str]:
+def _present_workers(client: Any) -> Sequence[str]:
     """Addresses; none where the scheduler does not answer."""
     try:
         return list(client.nthreads())
@@ -236,8 +238,8 @@ def _cause(error: BaseException) -> str:
     while error.__cause__ is not None:
         error = error.__cause__
     if isinstance(error, subprocess.CalledProcessError):
-        words = (error.stderr or b"").decode("utf-8", "replace").strip().splitlines()
-        return f"exit code {error.returncode}{f', saying: {words[-1]}' if words else ''}"
+        lines = (error.stderr or b"").decode("utf-8", "replace").strip().splitlines()
+        return f"exit code {error.returncode}{f', saying: {lines[-1]}' if lines else ''}"
     return f"{type(error).__name__}: {str(error).partition(chr(10))[0]}"
 
 

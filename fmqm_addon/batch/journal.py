@@ -35,9 +35,9 @@ def row_key(row: Row, options: Options, versions: Mapping[str, str]) -> str:
 
     Its id and threshold are not part of it: they can change without a new score.
     """
-    told = asdict(row) | {"folder": os.path.abspath(row.folder), "id": None, "fail_under": None}
+    plain = asdict(row) | {"folder": os.path.abspath(row.folder), "id": None, "fail_under": None}
     stamps = [_stamp(path) for path in row.files()]
-    text = json.dumps([told, options.as_dict(), dict(versions), stamps], sort_keys=True)
+    text = json.dumps([plain, options.as_dict(), dict(versions), stamps], sort_keys=True)
     return hashlib.blake2b(text.encode("utf-8", "surrogatepass"), digest_size=16).hexdigest()
 
 
@@ -111,7 +111,7 @@ class Journal:
         return pair
 
     def damage(self) -> str:
-        """What is to be told where lines are damaged."""
+        """The message about damaged lines."""
         lines = "1 line does" if self.damaged == 1 else f"{self.damaged} lines do"
         return (
             f"{self.path}: {lines} not fit the digest (a fault of the disk, an editor, or an older version); "
@@ -261,4 +261,4 @@ class Records:
     def __iter__(self) -> Iterator[dict[str, Any]]:
         for row, key in zip(self._rows, self._keys, strict=True):
             limit = self._fail_under if row.fail_under is None else row.fail_under
-            yield self._journal.record(key) | row.told() | {"fail_under": limit}
+            yield self._journal.record(key) | row.record_fields() | {"fail_under": limit}

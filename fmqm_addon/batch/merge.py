@@ -12,7 +12,7 @@ from .journal import Journal, differences
 from .progress_log import Log
 from .rows import Row
 
-_TOLD = ("settings", "fail_under")  # what a record of an output has besides
+_REQUIRED = ("settings", "fail_under")  # what a record of an output has besides
 _MADE_BY = ("fmqm_version", "fmqm_code", "blender_version")
 
 
@@ -22,7 +22,7 @@ class Merged:
     Args:
         rows: give the order, and which there should be. None takes what the parts have: in the order of the whole,
             where they know which shards they are.
-        log: is told of ids that are there twice (the first counts), missing, or not among the rows.
+        log: gets a line for ids that are there twice (the first counts), missing, or not among the rows.
         fail_under: of pairs whose row has none; None leaves those of the parts.
 
     Attributes:
@@ -101,7 +101,7 @@ class Merged:
 
 def _difference(record: Mapping[str, Any], row: Row) -> str:
     """What was scored otherwise than the row wants it; "" for nothing."""
-    for name, wanted in row.told().items():
+    for name, wanted in row.record_fields().items():
         if (scored := record.get(name)) != wanted:
             return f"{name} {scored or 'none'} instead of {wanted or 'none'}"
     return ""
@@ -135,7 +135,7 @@ def _fault(part: Any) -> str:
     if not isinstance(part.get("pairs"), list):
         return "pairs is missing"
     for index, pair in enumerate(part["pairs"], 1):
-        if fault := record_fault(pair) or "".join(f"{name} is missing" for name in _TOLD if name not in pair):
+        if fault := record_fault(pair) or "".join(f"{name} is missing" for name in _REQUIRED if name not in pair):
             return f"pair {index}: {fault}"
     match part.get("shard", [1, 1]):
         case [int() as number, int() as count] if 1 <= number <= count:

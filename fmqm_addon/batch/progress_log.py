@@ -40,7 +40,7 @@ class Log:
             return
         self._percent = percent
         line = f"{percent:3d} %  {one_line(text)}{self._rate()}"
-        tell(f"\r\x1b[K{line}" if self._moving else f"{line}\n")
+        print_stderr(f"\r\x1b[K{line}" if self._moving else f"{line}\n")
 
     def scored(self, record: Mapping[str, Any]) -> None:
         """Counts a pair that was scored elsewhere as a unit."""
@@ -60,7 +60,7 @@ class Log:
             text = f"{name}: {text}"
         if not self._silent:
             self.end()
-            tell(f"{self._program}: {kind}{one_line(text)}\n")
+            print_stderr(f"{self._program}: {kind}{one_line(text)}\n")
 
     def note(self, text: str) -> None:
         """What is good to know, but no error."""
@@ -70,7 +70,7 @@ class Log:
     def end(self) -> None:
         """Clears the moving line."""
         if self._moving and not self._quiet:
-            tell("\r\x1b[K")
+            print_stderr("\r\x1b[K")
 
     def _rate(self) -> str:
         spent = time.monotonic() - self._began
@@ -80,9 +80,9 @@ class Log:
         return f"; {self.finished} of {self._pairs}, {_pace(self.finished / spent)}, {_duration(left)} left"
 
 
-def tell(text: str) -> None:
+def print_stderr(text: str) -> None:
     """Prints to stderr."""
-    with contextlib.suppress(FileError):  # the work goes on though nobody can be told
+    with contextlib.suppress(FileError):  # the work goes on though nobody reads
         print_parts(sys.stderr, [text])
 
 

@@ -48,10 +48,10 @@ class Options:
     def as_dict(self) -> dict[str, Any]:
         """Plain values under the names of the command line's flags."""
         rest = {"repeats": self.repeats, "space": self.space, "match_scale": self.match_scale}
-        asked = {name: True for name in ("attribution", "explain", "both") if getattr(self, name)}
+        extra = {name: True for name in ("attribution", "explain", "both") if getattr(self, name)}
         reading = ("bake", "max_image_side", "max_image_bytes")
-        asked |= {name: getattr(self, name) for name in reading if getattr(self, name) is not None}
-        return self.settings.as_dict() | rest | asked
+        extra |= {name: getattr(self, name) for name in reading if getattr(self, name) is not None}
+        return self.settings.as_dict() | rest | extra
 
     def made_by(self, versions: Mapping[str, str]) -> dict[str, str]:
         """What travels with each record, and is compared where it arrives: the code, and a digest of all options."""
@@ -90,18 +90,18 @@ class Row:
         assets = [split_spec(self.path(name))[0] for name in (self.reference, self.distorted)]
         return [*assets, self.path(self.ref_texture), self.path(self.texture)]
 
-    def told(self) -> dict[str, Any]:
-        """What a record tells of it, as JSON has it."""
+    def record_fields(self) -> dict[str, Any]:
+        """What a record has of it, as plain values for JSON."""
         own = {name: str(value) if value == float("inf") else value for name, value in self.settings}
         textures = {"ref_texture": self.ref_texture or None, "texture": self.texture or None}
         return {"id": self.id, "reference": self.reference, "distorted": self.distorted, **textures, "settings": own}
 
     def failed(self, why: str) -> dict[str, Any]:
         """The record of a row that was not scored."""
-        return pair_record(PairScore(self.reference, self.distorted, error=why)) | self.told()
+        return pair_record(PairScore(self.reference, self.distorted, error=why)) | self.record_fields()
 
     @property
-    def preparation(self) -> tuple[Any, ...]:
+    def preparation_key(self) -> tuple[Any, ...]:
         """Pairs that are equal in it share the preparation of their reference."""
         return (self.path(self.reference), self.path(self.ref_texture), self.settings)
 
@@ -123,9 +123,9 @@ def task_of(plain: dict[str, Any]) -> Task:
     return Task(plain["key"], Row(**row | {"settings": tuple((name, value) for name, value in row["settings"])}))
 
 
-def grouped(tasks: Iterable[Task]) -> list[list[Task]]:
+def group_by_reference(tasks: Iterable[Task]) -> list[list[Task]]:
     """By what they prepare, in the order in which that first comes."""
     groups: dict[tuple[Any, ...], list[Task]] = {}
     for task in tasks:
-        groups.setdefault(task.row.preparation, []).append(task)
+        groups.setdefault(task.row.preparation_key, []).append(task)
     return list(groups.values())

@@ -22,10 +22,10 @@ from ..metric.errors import (
 from ..report.explain import explain, where
 from ..report.html.pictures import picture_stem, write_pair_pictures
 from ..report.records import PairScore, pair_record
-from .interrupt import stops_wait
+from .interrupt import defer_interrupts
 from .journal import Journal
-from .progress_log import Log, tell
-from .rows import Options, Row, Task, grouped, task_of
+from .progress_log import Log, print_stderr
+from .rows import Options, Row, Task, group_by_reference, task_of
 from .workers import NOTE, end_when_stuck, end_with_parent, journal_of
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def score_tasks(
         log: counts units_of(tasks). before_each: called before each pair.
     """
     scorer = _Scorer(options, journal, log, before_each)
-    for group in grouped(tasks):
+    for group in group_by_reference(tasks):
         scorer.score(group)
     log.end()
     return scorer.last
@@ -61,10 +61,10 @@ def score_tasks(
 
 def units_of(tasks: Sequence[Task]) -> int:
     """Of work: each pair, and each reference."""
-    return len(tasks) + len(grouped(tasks))
+    return len(tasks) + len(group_by_reference(tasks))
 
 
-def work_off(shard: str, options: Options, versions: Mapping[str, str], stuck_after: float) -> None:
+def score_shard(shard: str, options: Options, versions: Mapping[str, str], stuck_after: float) -> None:
     """What a worker does: scores the tasks of a shard into the journal beside it, as long as its parent lives.
 
     Raises:
@@ -85,7 +85,7 @@ class _WorkersLog(Log):
     """Only notes, which the parent reads and passes on; it sees the rest in the journal."""
 
     def note(self, text: str) -> None:
-        tell(f"{NOTE}{one_line(text)}\n")
+        print_stderr(f"{NOTE}{one_line(text)}\n")
 
 
 class _Scorer:
@@ -106,17 +106,17 @@ class _Scorer:
         from ..comparison.pair import measurement_of
 
         row = group[0].row
-        asked = _pair_options(self._options, row)
+        options = _pair_options(self._options, row)
         self._begin(group[0])
         began = time.perf_counter()
         failure = ""
         try:
             reference = self._load(row, row.reference, row.ref_texture)
-            self._tell_memory(reference, asked)
-            measurement = measurement_of(reference, BVHQuery, asked)
+            self._note_memory(reference, options)
+            measurement = measurement_of(reference, BVHQuery, options)
             self._work(measurement.prepare(), "preparing the reference")
         except Exception as error:
-            failure = _told(error, row.reference)
+            failure = _reason(error, row.reference)
         self._units += 1
         for task in group:
             if task is not group[0]:
@@ -130,7 +130,7 @@ class _Scorer:
                 except OutputError:
                     raise
                 except Exception as error:
-                    why = _told(error, task.row.distorted)
+                    why = _reason(error, task.row.distorted)
             if why:
                 pair = replace(pair, error=why)
                 self._log.say(why, task.row.id)
@@ -194,18 +194,18 @@ class _Scorer:
 
         reading = _reading(self._options)
         try:
-            with stops_wait():
+            with defer_interrupts():
                 if image:
                     reading = replace(reading, texture=load_texture(row.path(image), reading.limits))
                 return load_asset(row.path(name), reading, self._log.note)
         finally:
             self._spent("load", time.perf_counter() - began)
 
-    def _tell_memory(self, reference: AssetMesh, asked: PairOptions) -> None:
+    def _note_memory(self, reference: AssetMesh, options: PairOptions) -> None:
         from ..comparison.memory import WORTH_SAYING, peak_bytes, peak_text
 
-        if peak_bytes(reference.mesh, asked.settings, asked.repeats) > WORTH_SAYING:
-            self._log.note(peak_text(reference.mesh, asked.settings, asked.repeats))
+        if peak_bytes(reference.mesh, options.settings, options.repeats) > WORTH_SAYING:
+            self._log.note(peak_text(reference.mesh, options.settings, options.repeats))
 
     def _work(self, stepper: Stepper[T], text: str) -> T:
         """Runs a stepper to its end with its progress shown and its seconds added up by stage."""
@@ -219,7 +219,7 @@ class _Scorer:
         self._seconds[stage] = self._seconds.get(stage, 0.0) + seconds
 
 
-def _told(error: Exception, name: str) -> str:
+def _reason(error: Exception, name: str) -> str:
     """Why there are no scores; what nobody has foreseen is no reason to leave the other pairs alone."""
     if isinstance(error, FMQMError):
         return str(error) + REMEDIES.get(type(error), "")

@@ -24,19 +24,19 @@ from typing import Any
 
 from ..folders import TEMPORARY_PLACES
 from ..metric.errors import FileError, FMQMError
-from .interrupt import stops_wait
+from .interrupt import defer_interrupts
 from .journal import Journal, own_record, parse_line
 from .progress_log import Log
-from .rows import Task, grouped
+from .rows import Task, group_by_reference
 
 PACKAGE = Path(__file__).resolve().parents[1]
 NOTE = "note: "  # begins a line that a worker prints for this process's log
 WORKER = "FMQM_WORKER"  # set in the environment of workers
 TRIES = 2  # a pair that ends its worker is tried once more
 _POLL = 0.1  # seconds between looks at the workers
-_WORTHWHILE = 5.0  # seconds of work that a worker is started for, at least
-_BARREN = 3  # workers in a row that end before their first pair: it is not the pairs
-_STARTING = 120.0  # seconds that a worker has to begin its first pair: a busy machine is not the pair's fault
+_MIN_SECONDS = 5.0  # seconds of work that a worker is started for, at least
+_MAX_FAILED_STARTS = 3  # workers in a row that end before their first pair: it is not the pairs
+_START_TIMEOUT = 120.0  # seconds that a worker has to begin its first pair: a busy machine is not the pair's fault
 _GRACE = 30.0  # seconds after its time-out until a stuck worker ends itself, should nobody do it
 _LONGEST = 1e8  # seconds, three years; faulthandler takes no more than its clock can count
 
@@ -84,15 +84,15 @@ def score_with_workers(
     pool = _Pool(tasks, command, folder, limits, journal, log, cwd)
     try:
         while pool.waiting or pool.workers:
-            with stops_wait():  # a stop inside of Popen.poll would leave its lock closed, and Popen.wait waiting
-                pool.look_after(jobs)
+            with defer_interrupts():  # a stop inside of Popen.poll would leave its lock closed, and Popen.wait waiting
+                pool.update(jobs)
             time.sleep(_POLL)
     finally:
         pool.stop()
     log.end()
 
 
-def adopt(folder: Path, journal: Journal) -> None:
+def recover_scores(folder: Path, journal: Journal) -> None:
     """Takes over the scores of workers whose parent was killed before it read them, and which pairs they were at."""
     for path in sorted(folder.glob("shard-*.jsonl")):
         for event in map(parse_line, path.read_bytes().splitlines()):
@@ -119,7 +119,7 @@ class _Pool:
         # Last, what an earlier run began and did not end: it may have been what ended that run.
         fresh = [task for task in tasks if not journal.was_begun(task.key)]
         begun = [task for task in tasks if journal.was_begun(task.key)]
-        self.waiting = deque(task for part in (fresh, begun) for group in grouped(part) for task in group)
+        self.waiting = deque(task for part in (fresh, begun) for group in group_by_reference(part) for task in group)
         self.workers: list[_Worker] = []
         self._command = command
         self._folder = folder
@@ -131,9 +131,9 @@ class _Pool:
         self._began = time.monotonic()
         self._noted: set[str] = set()
         self._started = 0  # workers
-        self._barren = 0  # workers in a row that scored nothing
+        self._failed_starts = 0  # workers in a row that scored nothing
 
-    def look_after(self, jobs: int) -> None:
+    def update(self, jobs: int) -> None:
         """Starts workers where there is room, takes what they have done, and replaces those that failed."""
         while self.waiting and len(self.workers) < jobs:
             share = [self.waiting.popleft() for _ in range(self._share(jobs))]
@@ -141,19 +141,19 @@ class _Pool:
             shard = self._folder / f"shard-{self._started}.json"
             self.workers.append(_Worker(self._command, shard, share, self._cwd))
         for worker in list(self.workers):
-            self._take_news(worker)  # first, since this process may have stood still for long, and the worker not
+            self._read_events(worker)  # first, since this process may have stood still for long, and the worker not
             trouble = worker.trouble(self._limits)
             if worker.ended or trouble:
                 worker.end()
-                self._take_news(worker)
+                self._read_events(worker)
                 self.workers.remove(worker)
-                self._bury(worker, trouble)
+                self._replace_worker(worker, trouble)
 
     def stop(self) -> None:
         """Ends all workers, and takes what they have done."""
         for worker in self.workers:
             worker.end()
-            self._take_news(worker)
+            self._read_events(worker)
 
     def _share(self, jobs: int) -> int:
         """Much at first, less towards the end, so that all finish together; but worth the start of a worker."""
@@ -163,35 +163,35 @@ class _Pool:
         if not self._log.finished:
             return math.ceil(fair * 0.75)
         seconds = (time.monotonic() - self._began) * jobs / self._log.finished
-        return min(len(self.waiting), math.ceil(max(len(self.waiting) / jobs / 2, _WORTHWHILE / seconds)))
+        return min(len(self.waiting), math.ceil(max(len(self.waiting) / jobs / 2, _MIN_SECONDS / seconds)))
 
-    def _take_news(self, worker: _Worker) -> None:
-        for note in worker.notes():
+    def _read_events(self, worker: _Worker) -> None:
+        for note in worker.new_notes():
             if note not in self._noted:  # each worker that prepares a reference has the same to say
                 self._noted.add(note)
                 self._log.note(note)
-        for event in worker.news():
+        for event in worker.new_events():
             if "start" in event:
                 self._journal.start(event["start"])
             elif "done" in event:
                 self._finish(event["done"], own_record(event, self._journal.made_by))
 
     def _finish(self, key: str, record: Mapping[str, Any]) -> None:
-        self._barren = 0
+        self._failed_starts = 0
         self._journal.done(key, record)
         self._log.scored(record)
 
-    def _bury(self, worker: _Worker, trouble: str) -> None:
+    def _replace_worker(self, worker: _Worker, trouble: str) -> None:
         """What it left goes to the next; the pair it failed at is tried once more, after all others."""
         rest = list(worker.tasks.values())
         if not rest:
             return
-        why = trouble or worker.farewell()
+        why = trouble or worker.exit_reason()
         failed = worker.tasks.get(worker.at)
         if failed is None:
-            self._barren += 1
-            if self._barren == _BARREN:
-                raise FMQMError(f"workers end before their first pair ({worker.last_words() or why})")
+            self._failed_starts += 1
+            if self._failed_starts == _MAX_FAILED_STARTS:
+                raise FMQMError(f"workers end before their first pair ({worker.last_line() or why})")
             self.waiting.extendleft(reversed(rest))
             return
         rest.remove(failed)
@@ -206,7 +206,7 @@ class _Pool:
 
 
 class _Worker:
-    """A process, its shard, and what its journal has told so far.
+    """A process, its shard, and its journal as far as it is read.
 
     Attributes:
         tasks: those it has not done, by key. at: key of the one it is at, "" before the first and between two.
@@ -245,16 +245,16 @@ class _Worker:
         if self.ended:
             return ""
         silent = time.monotonic() - self._heard
-        if not self._begun and silent > max(_STARTING, limits.timeout):
-            return f"it does not begin within {max(_STARTING, limits.timeout):g} s"
+        if not self._begun and silent > max(_START_TIMEOUT, limits.timeout):
+            return f"it does not begin within {max(_START_TIMEOUT, limits.timeout):g} s"
         if self._begun and silent > limits.timeout:
             return f"not scored within {limits.timeout:g} s (--timeout)"
         if limits.memory is not None and (resident_bytes(self._process.pid) or 0) > limits.memory:
             return f"scoring it takes more than {limits.memory / 1e9:g} GB of memory (--memory-limit)"
         return ""
 
-    def news(self) -> list[dict[str, Any]]:
-        """The events that its journal tells since the last time; a line that is still being written comes later."""
+    def new_events(self) -> list[dict[str, Any]]:
+        """The events in its journal since the last time; a line that is still being written comes later."""
         whole = _whole_lines(Path(journal_of(str(self._shard))), self._read)
         self._read += len(whole)
         events = [parse_line(line) for line in whole.splitlines()]
@@ -264,7 +264,7 @@ class _Worker:
             self.tasks.pop(event.get("done", ""), None)
         return events
 
-    def notes(self) -> list[str]:
+    def new_notes(self) -> list[str]:
         """What it has noted since the last time."""
         whole = _whole_lines(self._log, self._read_log)
         self._read_log += len(whole)
@@ -278,14 +278,14 @@ class _Worker:
         if self._process.stdin:
             self._process.stdin.close()
 
-    def farewell(self) -> str:
+    def exit_reason(self) -> str:
         """How it ended by itself, and what it said last."""
         code = self._process.returncode
         how = f"ended with exit code {code}" if code >= 0 else f"died ({_signal_name(-code)})"
-        words = self.last_words()
-        return f"its worker {how}{f', saying: {words}' if words else ''}"
+        line = self.last_line()
+        return f"its worker {how}{f', saying: {line}' if line else ''}"
 
-    def last_words(self) -> str:
+    def last_line(self) -> str:
         lines = self._log.read_text(encoding="utf-8", errors="replace").split("\n")
         return next((line.strip() for line in reversed(lines) if line.strip()), "")
 
@@ -309,15 +309,15 @@ def _signal_name(number: int) -> str:
 
 
 def resident_bytes(pid: int) -> int | None:
-    """Resident memory of a process; None if it is gone, or this system does not tell."""
+    """Resident memory of a process; None if it is gone, or unknown on this system."""
     try:
         pages = int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1])
         return pages * os.sysconf("SC_PAGE_SIZE")
     except (OSError, ValueError, IndexError):
         pass
     try:
-        told = subprocess.run(["ps", "-o", "rss=", "-p", str(pid)], capture_output=True, text=True, check=False)
-        return int(told.stdout) * 1024
+        ps = subprocess.run(["ps", "-o", "rss=", "-p", str(pid)], capture_output=True, text=True, check=False)
+        return int(ps.stdout) * 1024
     except (OSError, ValueError):
         return None
 

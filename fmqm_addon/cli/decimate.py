@@ -16,7 +16,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
-from ..batch.interrupt import stops_wait
+from ..batch.interrupt import defer_interrupts
 from ..batch.progress_log import Log
 from ..batch.scorer import REMEDIES
 from ..blender.access import Access
@@ -140,14 +140,14 @@ def _search(args: argparse.Namespace, targets: list[float], settings: Settings, 
     reading = Reading(access=Access(args.untrusted, args.asset_root or ""))
     if files:
         check_outputs(args.reference, files, reading)
-    with stops_wait():
+    with defer_interrupts():
         sizes = () if args.target_texture is None else tuple(texture_sizes(args.reference, reading))
     goal = DecimationGoal(tuple(targets), args.max_triangles, args.target_texture, sizes)
     written = written_reader(args.reference, outputs[0], reading) if outputs else None
     stepper = decimating(file_reader(args.reference, reading), BVHQuery, goal, settings, written)
     more = True
     while more:
-        with stops_wait():
+        with defer_interrupts():
             more = stepper.step()
         log.show(stepper.progress.done, stepper.progress.stage)
     log.end()
@@ -160,7 +160,7 @@ def _search(args: argparse.Namespace, targets: list[float], settings: Settings, 
             errors.append(f"{args.reference}: {_missed(outcome, args.max_triangles, args.output)}")
         elif outputs:
             try:
-                with stops_wait():
+                with defer_interrupts():
                     warnings += save_version(args.reference, outcome.last.best.version, outputs[number], reading)
                 saved[number] = outputs[number]
             except FMQMError as error:

@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NoReturn, TextIO
 
-from ..batch.interrupt import INTERRUPTED, kill_if_deaf, stop_on_signals, stopped, stops_wait
+from ..batch.interrupt import INTERRUPTED, defer_interrupts, handle_signals, interrupted, kill_if_unresponsive
 from ..batch.workers import WORKER
 from ..folders import TEMPORARY_PLACES, keep_folder, remove_all
 from ..metric.errors import FMQMError
@@ -31,13 +31,13 @@ def prepare_bpy() -> None:
         FMQMError: as require_bpy; or there is no place for temporary files.
     """
     if WORKER not in os.environ:  # whose parent sees to both
-        kill_if_deaf()
+        kill_if_unresponsive()
         if "bpy" not in sys.modules:
-            _own_temporary_files()
+            _use_temporary_folder()
     require_bpy()
 
 
-def _own_temporary_files() -> None:
+def _use_temporary_folder() -> None:
     """Lets all temporary files of this process, Blender's too, go to a folder that a later run sweeps if we crash."""
     try:
         folder = str(keep_folder())
@@ -55,7 +55,7 @@ def require_bpy() -> None:
         FMQMError: it cannot be imported; the text says what to install.
     """
     try:
-        with stops_wait():  # Blender's scripts start with it, and go on without what was stopped
+        with defer_interrupts():  # Blender's scripts start with it, and go on without what was interrupted
             importlib.import_module("bpy")
     except ModuleNotFoundError as error:
         raise FMQMError(
@@ -69,7 +69,7 @@ def require_bpy() -> None:
 
 
 def blender_version() -> str:
-    """Blender's version, such as 4.5.15, without importing bpy where its package tells.
+    """Blender's version, such as 4.5.15, without importing bpy where its package has it.
 
     Raises:
         FMQMError: there is no bpy.
@@ -91,12 +91,12 @@ def run_script(main: Callable[[Sequence[str], TextIO], int], script: str) -> NoR
     if os.path.basename(sys.argv[0]) != os.path.basename(script):
         argv = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
     _open_streams()
-    stop_on_signals()
-    out = take_stdout()
+    handle_signals()
+    out = reserve_stdout()
     try:
         os.getcwd()
         code = main(argv, out)
-        if stopped():
+        if interrupted():
             code = INTERRUPTED
     except KeyboardInterrupt:
         code = INTERRUPTED
@@ -108,13 +108,13 @@ def run_script(main: Callable[[Sequence[str], TextIO], int], script: str) -> NoR
             else:
                 traceback.print_exc()  # Blender would do the same, go on and end with 0
     finally:
-        _let_go(out)
-        _let_go(sys.stderr)
+        _flush(out)
+        _flush(sys.stderr)
     sys.exit(code)
 
 
 def machine_memory() -> int | None:
-    """Bytes of memory that this machine has, or lends to this group of processes; None where it does not tell."""
+    """Bytes of memory that this machine has, or lends to this group of processes; None where it is unknown."""
     try:
         found = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     except (AttributeError, OSError, ValueError):
@@ -134,13 +134,13 @@ def _has_working_folder() -> bool:
         return False
 
 
-def _let_go(stream: TextIO) -> None:
+def _flush(stream: TextIO) -> None:
     """Prints what is left, if anybody reads it; else Python would complain of it when it ends."""
     try:
         stream.flush()
     except (OSError, ValueError):
         with contextlib.suppress(OSError, ValueError):
-            _lead_nowhere(stream.fileno())
+            _redirect_to_null(stream.fileno())
 
 
 def _open_streams() -> None:
@@ -153,13 +153,13 @@ def _open_streams() -> None:
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
 
 
-def _lead_nowhere(number: int) -> None:
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, number)
-    os.close(nowhere)
+def _redirect_to_null(number: int) -> None:
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, number)
+    os.close(null)
 
 
-def take_stdout() -> TextIO:
+def reserve_stdout() -> TextIO:
     """Standard output for this script alone.
 
     Importers print to it from C, some of it only when the process ends: from here on that goes nowhere.
@@ -167,5 +167,5 @@ def take_stdout() -> TextIO:
     with contextlib.suppress(OSError):
         sys.stdout.flush()
     out = open(os.dup(1), "w", encoding="utf-8", errors="backslashreplace", newline="")  # noqa: SIM115
-    _lead_nowhere(1)
+    _redirect_to_null(1)
     return out

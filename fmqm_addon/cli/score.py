@@ -17,14 +17,14 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, TextIO
 
 from ..batch.cluster import WAIT, score_on_cluster
-from ..batch.interrupt import stops_wait
+from ..batch.interrupt import defer_interrupts
 from ..batch.journal import Journal, Records, row_key
 from ..batch.manifest import glob_files, lod_rows, plain_rows, read_manifest
 from ..batch.merge import Merged
-from ..batch.progress_log import Log, tell
+from ..batch.progress_log import Log, print_stderr
 from ..batch.rows import Options, Row, Task
-from ..batch.scorer import score_tasks, units_of, work_off
-from ..batch.workers import WORKER, Limits, adopt, score_with_workers, workers_command
+from ..batch.scorer import score_shard, score_tasks, units_of
+from ..batch.workers import WORKER, Limits, recover_scores, score_with_workers, workers_command
 from ..blender.access import Access
 from ..folders import TEMPORARY, own_folder, sweep
 from ..metric.errors import FileError, FMQMError, SettingsError
@@ -86,7 +86,7 @@ def main(argv: Sequence[str], out: TextIO, program: str = PROGRAM) -> int:
             raise FMQMError("a worker without a shard; this is a fault of the program")
         if args.worker:
             prepare_bpy()
-            work_off(args.worker, options, provenance(blender_version()), limits.timeout)
+            score_shard(args.worker, options, provenance(blender_version()), limits.timeout)
             return OK
         rows = _rows(args, options)
         outputs = output_files(args)
@@ -103,7 +103,7 @@ def main(argv: Sequence[str], out: TextIO, program: str = PROGRAM) -> int:
     except SettingsError as error:
         parser.error(str(error))
     except FMQMError as error:
-        tell(f"{args.program}: {error}\n")
+        print_stderr(f"{args.program}: {error}\n")
         return FAILED
 
 
@@ -122,7 +122,7 @@ def _rows(args: argparse.Namespace, options: Options) -> list[Row] | None:
         rows = read_manifest(args.manifest, options.settings)
     elif args.lods:
         prepare_bpy()
-        with stops_wait():
+        with defer_interrupts():
             rows = lod_rows(args.lods, Access(options.untrusted, options.asset_root))
     elif args.reference:
         names = glob_files(args.reference, args.glob) if args.glob else args.distorted
@@ -144,11 +144,11 @@ def _score(
     path = journal_path(args)
     journal = Journal(path, args.resume, options.made_by(versions))
     if journal.damaged:
-        tell(f"{args.program}: {journal.damage()}\n")
+        print_stderr(f"{args.program}: {journal.damage()}\n")
     folder = os.path.dirname(path) if path else tempfile.gettempdir()
     kind = f"workers-{digest_of(os.path.basename(path))}" if path else TEMPORARY
     if path:  # what a run of this journal that was killed has left
-        sweep(folder, kind, functools.partial(adopt, journal=journal) if args.resume else None)
+        sweep(folder, kind, functools.partial(recover_scores, journal=journal) if args.resume else None)
     waiting = {
         key: Task(key, row)
         for key, row in zip(keys, rows, strict=True)
@@ -156,8 +156,8 @@ def _score(
     }
     tasks = list(waiting.values())
     # A pair that ends its process, as some files do, shall be an error of its own.
-    asked = args.jobs or args.timeout or args.memory_limit or args.untrusted
-    use_workers = bool(asked or len(rows) > 1 or any(journal.was_begun(task.key) for task in tasks))
+    watched = args.jobs or args.timeout or args.memory_limit or args.untrusted
+    use_workers = bool(watched or len(rows) > 1 or any(journal.was_begun(task.key) for task in tasks))
     last = None
     try:
         if args.dask:
@@ -173,7 +173,7 @@ def _score(
             last = score_tasks(tasks, options, journal, Log(args.program, units_of(tasks), len(tasks), args.quiet))
     except KeyboardInterrupt:
         if path:
-            tell(f"{args.program}: interrupted; --resume goes on where {path} ends\n")
+            print_stderr(f"{args.program}: interrupted; --resume goes on where {path} ends\n")
         raise
     except OSError as error:
         raise FileError(f"{folder or os.curdir}: workers need a folder here ({error.strerror or error})") from error

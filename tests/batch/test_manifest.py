@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from fmqm_addon.batch.manifest import glob_files, plain_rows, read_manifest
-from fmqm_addon.batch.rows import Options, Row, Task, grouped, task_of
+from fmqm_addon.batch.rows import Options, Row, Task, group_by_reference, task_of
 from fmqm_addon.metric.errors import FileError, FMQMError, SettingsError
 from fmqm_addon.metric.settings import Settings
 
@@ -138,7 +138,7 @@ def test_rows_that_share_a_reference_come_together() -> None:
         Row("1", "a", "x"), Row("2", "b", "x"), Row("3", "a", "y"), Row("4", "a", "z", settings=(("seed", 1),)),
         Row("5", "a", "z", ref_texture="t"), Row("6", "b", "y", fail_under=0.5),
     ]  # fmt: skip
-    groups = grouped([Task(row.id, row) for row in rows])
+    groups = group_by_reference([Task(row.id, row) for row in rows])
     assert [[task.key for task in group] for group in groups] == [["1", "3"], ["2", "6"], ["4"], ["5"]]
 
 

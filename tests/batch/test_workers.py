@@ -18,7 +18,15 @@ from fmqm_addon.batch import workers
 from fmqm_addon.batch.journal import Journal, parse_line
 from fmqm_addon.batch.progress_log import Log
 from fmqm_addon.batch.rows import Row, Task
-from fmqm_addon.batch.workers import WORKER, Command, Limits, adopt, journal_of, score_with_workers, workers_command
+from fmqm_addon.batch.workers import (
+    WORKER,
+    Command,
+    Limits,
+    journal_of,
+    recover_scores,
+    score_with_workers,
+    workers_command,
+)
 from fmqm_addon.metric.errors import FileError, FMQMError
 from fmqm_addon.report.records import SHOWN, PairScore, pair_record
 
@@ -126,7 +134,7 @@ def test_only_scores_are_adopted_and_only_new_ones(tmp_path: Path) -> None:
     journal = Journal()
     journal.done("scored", record("scored", 0.9))
     journal.done("repaired", record("repaired", None))
-    adopt(tmp_path, journal)
+    recover_scores(tmp_path, journal)
     scores = {key: journal.record(key)["FMQM"] for key in ("scored", "repaired", "new")}
     assert scores == {"scored": 0.9, "repaired": 0.1, "new": 0.1} and "failed" not in journal
 
@@ -157,7 +165,7 @@ def test_starting_a_worker_is_not_the_pairs_time(tmp_path: Path) -> None:
 
 def test_a_worker_that_never_begins_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "slow").touch()
-    monkeypatch.setattr(workers, "_STARTING", 0.1)
+    monkeypatch.setattr(workers, "_START_TIMEOUT", 0.1)
     with pytest.raises(FMQMError, match=r"workers end before their first pair \(it does not begin within 0\.1 s\)"):
         watch(tmp_path, tasks_of("fine"), limits=Limits(timeout=0.1))
     assert not alive(tmp_path)
@@ -192,9 +200,9 @@ PARENT = """
 import sys
 from pathlib import Path
 sys.path.insert(0, sys.argv[1])
-from fmqm_addon.batch.interrupt import stop_on_signals
+from fmqm_addon.batch.interrupt import handle_signals
 from tests.batch.test_workers import tasks_of, watch
-stop_on_signals()  # as score.py
+handle_signals()  # as score.py
 try:
     watch(Path(sys.argv[2]), tasks_of("fine", "hang", "fine", "hang"))
 except KeyboardInterrupt:
@@ -210,7 +218,7 @@ def test_workers_end_with_their_parent_and_what_they_did_is_kept(tmp_path: Path,
     assert parent.wait(60) == (130 if how == signal.SIGINT else -how)
     wait_for(lambda: not alive(tmp_path))
     journal = Journal(str(tmp_path / "journal"), resume=True)
-    adopt(tmp_path, journal)
+    recover_scores(tmp_path, journal)
     assert "k0" in journal and "k1" not in journal
 
 

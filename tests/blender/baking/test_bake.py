@@ -724,8 +724,8 @@ def test_standard_output_of_a_script_stays_its_own() -> None:
     program = """
 import sys
 sys.path[:0] = [sys.argv[1]]
-from fmqm_addon.cli.process import take_stdout
-out = take_stdout()
+from fmqm_addon.cli.process import reserve_stdout
+out = reserve_stdout()
 from tests.blender import scenes
 from tests.blender.baking import test_bake
 scenes.clear()
