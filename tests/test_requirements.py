@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
 
 ROOT = Path(__file__).resolve().parents[1]
 KINDS = ("requirements", "requirements-cluster", "requirements-dev")
@@ -48,6 +49,24 @@ def test_the_ranges_hold_what_is_tested() -> None:
     tested = pins("requirements") + pins("requirements-cluster")
     assert {Requirement(each).name for each in ranges} == {pin.name for pin in tested}
     for each in map(Requirement, ranges):
-        versions = [next(iter(pin.specifier)).version for pin in tested if pin.name == each.name]
+        same = [pin for pin in tested if pin.name == each.name and (not each.marker or pin.marker == each.marker)]
+        versions = [next(iter(pin.specifier)).version for pin in same]
         assert versions and all(version in each.specifier for version in versions)
-        assert any(part.operator.startswith("<") for part in each.specifier), "nothing newer is promised"
+        assert any(part.operator in ("<", "==") for part in each.specifier), "nothing newer is promised"
+
+
+def test_the_pinned_build_is_the_one_that_builds_in_tests() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    (build,) = project["build-system"]["requires"]
+    assert build in {f"{pin.name}{pin.specifier}" for pin in pins("requirements-dev")}
+
+
+def test_the_pythons_that_are_promised_have_a_bpy() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    promised = SpecifierSet(project["requires-python"])
+    found = [minor for minor in range(8, 20) if f"3.{minor}.9" in promised]
+    blender = [Requirement(each) for each in project["optional-dependencies"]["blender"]]
+    markers = [each.marker for each in blender if each.marker]
+    environments = {minor: {"python_version": f"3.{minor}"} for minor in range(8, 20)}
+    with_bpy = [minor for minor, each in environments.items() if any(marker.evaluate(each) for marker in markers)]
+    assert found == with_bpy == [11, 13]

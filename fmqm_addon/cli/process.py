@@ -59,8 +59,8 @@ def require_bpy() -> None:
             importlib.import_module("bpy")
     except ModuleNotFoundError as error:
         raise FMQMError(
-            "this Python has no bpy: run `make demo` once and use .venv/bin/python, or run under Blender itself: "
-            "blender -b -q --python scripts/score.py -- ..."
+            "this Python has no bpy: pip install 'fmqm[blender]' with Python 3.11 or 3.13 (in a checkout run `make "
+            "demo` once and use .venv/bin/python), or run under Blender: blender -b -q --python scripts/score.py -- ..."
         ) from error
     except ImportError as error:
         raise FMQMError(
@@ -81,15 +81,20 @@ def blender_version() -> str:
     return ".".join(map(str, sys.modules["bpy"].app.version))
 
 
-def run_script(main: Callable[[Sequence[str], TextIO], int], script: str) -> NoReturn:
+def run_script(
+    main: Callable[[Sequence[str], TextIO], int], script: str, argv: Sequence[str] | None = None
+) -> NoReturn:
     """Ends the process with the exit code of main, which gets arguments and standard output.
 
     Args:
-        script: its __file__. Under Blender, whose name argv[0] is then, the arguments follow --.
+        script: its __file__, or its name.
+        argv: its arguments; None takes those of the process. Under Blender, whose name sys.argv[0] is then, they
+            follow --.
     """
-    argv = sys.argv[1:]
-    if os.path.basename(sys.argv[0]) != os.path.basename(script):
-        argv = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
+    if argv is None:
+        argv = sys.argv[1:]
+        if os.path.basename(sys.argv[0]) != os.path.basename(script):
+            argv = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
     _open_streams()
     handle_signals()
     out = reserve_stdout()
