@@ -21,6 +21,7 @@ from ..folders import TEMPORARY_PLACES, keep_folder, remove_all
 from ..metric.errors import FMQMError
 
 OK, FAILED, WRONG_ARGUMENTS = 0, 1, 2  # exit codes, and INTERRUPTED
+_exit_code = FAILED  # of this process; as long as none is known, it has failed
 SYSTEM_PACKAGES = "libx11-6 libxrender1 libxxf86vm1 libxfixes3 libxi6 libxkbcommon0 libsm6 libice6 libgl1 libegl1"
 
 
@@ -30,9 +31,12 @@ def prepare_bpy() -> None:
     Raises:
         FMQMError: as require_bpy; or there is no place for temporary files.
     """
-    if WORKER not in os.environ:  # whose parent sees to both
+    alone = WORKER not in os.environ  # a worker's parent sees to what it leaves, and that it ends
+    if alone:
         kill_if_unresponsive()
-        if "bpy" not in sys.modules:
+    if "bpy" not in sys.modules:
+        atexit.register(_end)  # before Blender's own, which runs first then
+        if alone:
             _use_temporary_folder()
     require_bpy()
 
@@ -43,9 +47,19 @@ def _use_temporary_folder() -> None:
         folder = str(keep_folder())
     except OSError as error:
         raise FMQMError(f"there is no place for temporary files ({error.strerror or error}); set TMPDIR") from error
-    atexit.register(remove_all)  # before Blender's own, which runs first then
     os.environ |= dict.fromkeys(TEMPORARY_PLACES, folder)
     tempfile.tempdir = folder
+
+
+def _end() -> NoReturn:
+    """Ends the process once Blender has freed what it holds, before the destructors of its libraries.
+
+    One of the bpy of 4.5 waits for a thread of its own, and that for ever once an image was written.
+    """
+    remove_all()
+    for stream in (sys.stdout, sys.stderr):
+        _flush(stream)
+    os._exit(_exit_code)
 
 
 def require_bpy() -> None:
@@ -105,6 +119,8 @@ def run_script(
             code = INTERRUPTED
     except KeyboardInterrupt:
         code = INTERRUPTED
+    except SystemExit as end:  # from the parser of arguments
+        code = end.code if isinstance(end.code, int) else FAILED
     except Exception as error:
         code = FAILED
         with contextlib.suppress(OSError):
@@ -115,6 +131,8 @@ def run_script(
     finally:
         _flush(out)
         _flush(sys.stderr)
+    global _exit_code
+    _exit_code = code
     sys.exit(code)
 
 
