@@ -8,21 +8,20 @@ import glob
 import json
 import os
 from collections.abc import Iterable, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from ..blender.access import ANYWHERE, Access
 from ..metric.errors import FileError, FMQMError, SettingsError
-from ..metric.settings import SETTING_NAMES, Settings
+from ..metric.settings import SETTING_NAMES, Settings, info_of
 from .rows import Row
 
 REQUIRED = ("reference", "distorted")
 OPTIONAL = ("id", "ref_texture", "texture", "fail_under")
 KNOWN = (*REQUIRED, *OPTIONAL, *SETTING_NAMES)
 
-_KINDS: dict[str, type] = {"int": int, "int | None": int, "float": float, "str": str}
-_KIND_OF = {field.name: _KINDS[str(field.type)] for field in fields(Settings)} | {"fail_under": float}
+_KIND_OF = {name: info_of(Settings, name).kind for name in SETTING_NAMES} | {"fail_under": float}
 
 
 def plain_rows(reference: str, distorted: Sequence[str], ref_texture: str, textures: Sequence[str]) -> list[Row]:
