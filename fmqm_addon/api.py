@@ -67,7 +67,14 @@ def measure(
     for asset in (reference, *assets):
         if not isinstance(asset, _ASSETS) or asset.is_embedded_data:
             raise TypeError(f"{asset!r} is given; an object or a collection, not the scene's own, is wanted")
-    options = PairOptions(settings or Settings(), repeats, space, match_scale, both, attribution)
+    options = PairOptions(
+        settings=settings or Settings(),
+        repeats=repeats,
+        space=space,
+        match_scale=match_scale,
+        both=both,
+        attribution=attribution,
+    )
     reference_target = target_of(reference, bare=reference_without_modifiers)
     targets = [target_of(asset) for asset in assets]
     return measuring(reference_target, targets, options, Reading(bake=bake)).run()

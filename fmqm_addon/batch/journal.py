@@ -24,13 +24,13 @@ except ImportError:  # Windows
 from ..metric.errors import FileError, SettingsError
 from ..report.record_check import checked_json, record_fault
 from ..report.records import PairScore, pair_record
-from .rows import Options, Row
+from .rows import BatchOptions, Row
 
 _BEGINNINGS = (b'{"start": "', b'{"done": "')  # of a line
 _TAIL = b', "digest": "'
 
 
-def row_key(row: Row, options: Options, versions: Mapping[str, str]) -> str:
+def row_key(row: Row, options: BatchOptions, versions: Mapping[str, str]) -> str:
     """What a score depends on: the row, all options, the program, and size and time of the files that it names.
 
     Its id and threshold are not part of it: they can change without a new score.
@@ -55,7 +55,7 @@ class Journal:
     Args:
         path: the file; None is a temporary one without a name.
         resume: go on with what the file holds, less a last line that was torn; else it is replaced.
-        made_by: what makes the numbers, as Options.made_by has it; records of something else do not count.
+        made_by: what makes the numbers, as BatchOptions.made_by has it; records of something else do not count.
 
     Attributes:
         damaged: lines that do not fit their digest, or are none of ours.

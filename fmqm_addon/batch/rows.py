@@ -11,47 +11,44 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from ..blender.files.asset_path import split_spec
-from ..metric.settings import Settings
+from ..blender.materials.image_headers import DEFAULT_LIMITS
+from ..blender.materials.types import Reading
+from ..comparison.pair import PairOptions
 from ..report.records import PairScore, pair_record
 
 
-@dataclass(frozen=True)
-class Options:
+@dataclass(frozen=True, kw_only=True)
+class BatchOptions:
     """How all pairs of a run are scored.
 
     Attributes:
-        settings: of the metric, before a row's own. repeats: seeds. space, match_scale: as comparison.alignment.align.
-        attribution: whose loss it is, too. explain: in words, too.
+        pair: of every pair, before a row's own settings.
+        reading: of all assets, textures of their own aside.
+        explain: in words, too.
         report: folder of the report, for pictures; "" makes none. It changes no score.
-        both: the other direction, too.
-        bake, max_image_side, max_image_bytes: as the flags; None where they are not given.
-        untrusted, asset_root: as the flags; "" where there is none. They change no score.
     """
 
-    settings: Settings
-    repeats: int = 1
-    space: str = "auto"
-    match_scale: bool = False
-    attribution: bool = False
+    pair: PairOptions = PairOptions()
+    reading: Reading = Reading()
     explain: bool = False
     report: str = ""
-    both: bool = False
-    bake: int | None = None
-    max_image_side: int | None = None
-    max_image_bytes: int | None = None
-    untrusted: bool = False
-    asset_root: str = ""
 
-    def settings_of(self, row: Row) -> Settings:
-        return replace(self.settings, **dict(row.settings))
+    def pair_of(self, row: Row) -> PairOptions:
+        """The options of a row's pair."""
+        return replace(self.pair, settings=replace(self.pair.settings, **dict(row.settings)))
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values under the names of the command line's flags."""
-        rest = {"repeats": self.repeats, "space": self.space, "match_scale": self.match_scale}
-        extra = {name: True for name in ("attribution", "explain", "both") if getattr(self, name)}
-        reading = ("bake", "max_image_side", "max_image_bytes")
-        extra |= {name: getattr(self, name) for name in reading if getattr(self, name) is not None}
-        return self.settings.as_dict() | rest | extra
+        """Plain values under the names of the command line's flags; which files may be named changes no score."""
+        pair, reading = self.pair, self.reading
+        extra: dict[str, Any] = {"attribution": pair.attribution, "explain": self.explain, "both": pair.both}
+        extra["bake"] = reading.bake if reading.stand_in or reading.bake != Reading.bake else None
+        for name, value, default in (
+            ("max_image_side", reading.limits.side, DEFAULT_LIMITS.side),
+            ("max_image_bytes", reading.limits.decoded, DEFAULT_LIMITS.decoded),
+        ):
+            extra[name] = None if value == default else value
+        given = {name: value for name, value in extra.items() if value is not None and value is not False}
+        return pair.as_dict() | given
 
     def made_by(self, versions: Mapping[str, str]) -> dict[str, str]:
         """What travels with each record, and is compared where it arrives: the code, and a digest of all options."""

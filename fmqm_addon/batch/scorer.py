@@ -25,11 +25,10 @@ from ..report.records import PairScore, pair_record
 from .interrupt import defer_interrupts
 from .journal import Journal
 from .progress_log import Log, print_stderr
-from .rows import Options, Row, Task, group_by_reference, task_of
+from .rows import BatchOptions, Row, Task, group_by_reference, task_of
 from .workers import NOTE, end_when_stuck, end_with_parent, journal_of
 
 if TYPE_CHECKING:
-    from ..blender.materials.types import Reading
     from ..comparison.alignment import AssetMesh
     from ..comparison.measurement import Measurement
     from ..comparison.pair import PairOptions, PairResult
@@ -45,7 +44,11 @@ REMEDIES: dict[type[Exception], str] = {
 
 
 def score_tasks(
-    tasks: Sequence[Task], options: Options, journal: Journal, log: Log, before_each: Callable[[], None] | None = None
+    tasks: Sequence[Task],
+    options: BatchOptions,
+    journal: Journal,
+    log: Log,
+    before_each: Callable[[], None] | None = None,
 ) -> PairResult | None:
     """Scores all into the journal; a pair that fails does not stop the others. None if the last one failed.
 
@@ -64,7 +67,7 @@ def units_of(tasks: Sequence[Task]) -> int:
     return len(tasks) + len(group_by_reference(tasks))
 
 
-def score_shard(shard: str, options: Options, versions: Mapping[str, str], stuck_after: float) -> None:
+def score_shard(shard: str, options: BatchOptions, versions: Mapping[str, str], stuck_after: float) -> None:
     """What a worker does: scores the tasks of a shard into the journal beside it, as long as its parent lives.
 
     Raises:
@@ -91,7 +94,9 @@ class _WorkersLog(Log):
 class _Scorer:
     """Where the work is, group after group."""
 
-    def __init__(self, options: Options, journal: Journal, log: Log, before_each: Callable[[], None] | None) -> None:
+    def __init__(
+        self, options: BatchOptions, journal: Journal, log: Log, before_each: Callable[[], None] | None
+    ) -> None:
         self.last: PairResult | None = None
         self._options = options
         self._journal = journal
@@ -106,7 +111,7 @@ class _Scorer:
         from ..comparison.pair import measurement_of
 
         row = group[0].row
-        options = _pair_options(self._options, row)
+        options = self._options.pair_of(row)
         self._begin(group[0])
         began = time.perf_counter()
         failure = ""
@@ -156,7 +161,7 @@ class _Scorer:
         from ..report.trust_table import trust_dict
 
         loaded = self._load(row, row.distorted, row.texture)
-        options, known = _pair_options(self._options, row), _reading(self._options).facts
+        options, known = self._options.pair_of(row), self._options.reading.facts
         answer = self._work(comparing_pair(measurement, reference, loaded, options, known), f"scoring {row.id}")
         self.last = answer
         comparison, result = answer.comparison, answer.comparison.result
@@ -192,7 +197,7 @@ class _Scorer:
         from ..blender.files.load import load_asset
         from ..blender.materials.images import load_texture
 
-        reading = _reading(self._options)
+        reading = self._options.reading
         try:
             with defer_interrupts():
                 if image:
@@ -225,29 +230,3 @@ def _reason(error: Exception, name: str) -> str:
         return str(error) + REMEDIES.get(type(error), "")
     kind = MemoryError if isinstance(error, MemoryError) else type(error)  # numpy has one of its own
     return one_line(f"{name}: {kind.__name__}: {error}")
-
-
-def _pair_options(options: Options, row: Row) -> PairOptions:
-    from ..comparison.pair import PairOptions
-
-    return PairOptions(
-        options.settings_of(row),
-        options.repeats,
-        options.space,
-        options.match_scale,
-        options.both,
-        options.attribution,
-    )
-
-
-def _reading(options: Options) -> Reading:
-    """How all assets of a run are read, textures of their own aside."""
-    from ..blender.access import Access
-    from ..blender.materials.image_headers import DEFAULT_LIMITS, ImageLimits
-    from ..blender.materials.types import Reading
-
-    limits = ImageLimits(
-        options.max_image_side or DEFAULT_LIMITS.side, options.max_image_bytes or DEFAULT_LIMITS.decoded
-    )
-    reading = Reading(limits=limits, access=Access(options.untrusted, options.asset_root))
-    return reading if options.bake is None else replace(reading, bake=options.bake, stand_in=options.bake > 0)

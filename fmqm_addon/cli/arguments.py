@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the commands' parsers share: errors of one line, and the flags of what files may name."""
+"""What the commands' parsers share: errors of one line, the flags of settings and of what files may name."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn, TextIO
 
 from ..metric.errors import SettingsError
+from ..metric.settings import PRESETS, SETTING_NAMES, Settings, info_of
 from .process import WRONG_ARGUMENTS
 
 
@@ -22,6 +23,32 @@ class OneLineParser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         self.exit(WRONG_ARGUMENTS, f"{self.prog}: error: {message} (--help lists all arguments)\n")
+
+
+def add_option(parser: argparse._ActionsContainer, owner: type, name: str) -> None:
+    """The flag of one option, with the text, the limits and the default that its dataclass has for it."""
+    info, default = info_of(owner, name), getattr(owner, name)
+    flag = flag_of(name)
+    if info.kind is bool:
+        parser.add_argument(flag, action="store_true", help=info.text)
+        return
+    notes = [] if info.choices else [info.wanted]
+    notes.append(f"default: {'all' if default is None else default}")
+    text = f"{info.text} ({'; '.join(notes)})"
+    if info.choices:
+        parser.add_argument(flag, choices=info.choices, help=text)
+    else:
+        parser.add_argument(flag, type=info.kind, metavar="N" if info.kind is int else "X", help=text)
+
+
+def settings_of(args: argparse.Namespace) -> Settings:
+    """The settings of the flags that are given, over those of the preset.
+
+    Raises:
+        SettingsError: a value is out of its range.
+    """
+    given = {name: value for name in SETTING_NAMES if (value := getattr(args, name, None)) is not None}
+    return Settings(**(PRESETS[args.preset] | given))
 
 
 def add_access(parser: argparse._ActionsContainer) -> None:

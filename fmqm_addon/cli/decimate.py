@@ -23,7 +23,7 @@ from ..blender.access import Access
 from ..blender.materials.types import Reading
 from ..metric.errors import FMQMError, OutsideError, SettingsError, one_line
 from ..metric.settings import PRESETS, Settings
-from .arguments import OneLineParser, add_access, check_access
+from .arguments import OneLineParser, add_access, add_option, check_access, settings_of
 from .process import FAILED, OK, prepare_bpy, run_script
 
 PROGRAM = "decimate.py"
@@ -53,8 +53,8 @@ def build_parser(program: str) -> OneLineParser:
         "--target-fmqm, of the decimated asset",
     )  # fmt: skip
     parser.add_argument("--preset", choices=PRESETS, default="paper", help="what decides; searching is always fast")
-    for name, text in (("samples", "number of samples"), ("patches", "number of patches"), ("seed", "random draws")):
-        parser.add_argument(f"--{name}", type=int, metavar="N", help=f"{text} (default: {getattr(Settings(), name)})")
+    for name in ("samples", "patches", "seed"):
+        add_option(parser, Settings, name)
     parser.add_argument(
         "-o", "--output", metavar="FILE",
         help=".glb .obj .ply .stl .fbx .usd, plain meshes as they are measured, without skeletons, shape keys and "
@@ -84,7 +84,7 @@ def main(argv: Sequence[str], out: TextIO, program: str = PROGRAM) -> int:
     args = parser.parse_args(argv)
     try:
         check_access(args)
-        settings = _settings(args)
+        settings = settings_of(args)
         targets = _targets(args)
         log = Log(args.program, 1, 1, args.quiet)
         return _search(args, targets, settings, log, out)
@@ -93,11 +93,6 @@ def main(argv: Sequence[str], out: TextIO, program: str = PROGRAM) -> int:
     except FMQMError as error:
         log.say(f"{error}{REMEDIES.get(type(error), '') if isinstance(error, OutsideError) else ''}")
         return FAILED
-
-
-def _settings(args: argparse.Namespace) -> Settings:
-    given = {name: getattr(args, name) for name in ("samples", "patches", "seed") if getattr(args, name) is not None}
-    return Settings(**(PRESETS[args.preset] | given))
 
 
 def _targets(args: argparse.Namespace) -> list[float]:

@@ -14,7 +14,7 @@ import functools
 import os
 import tempfile
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, TextIO
+from typing import TextIO
 
 from ..batch.cluster import WAIT, score_on_cluster
 from ..batch.interrupt import defer_interrupts
@@ -22,13 +22,11 @@ from ..batch.journal import Journal, Records, row_key
 from ..batch.manifest import glob_files, lod_rows, plain_rows, read_manifest
 from ..batch.merge import Merged
 from ..batch.progress_log import Log, print_stderr
-from ..batch.rows import Options, Row, Task
+from ..batch.rows import BatchOptions, Row, Task
 from ..batch.scorer import score_shard, score_tasks, units_of
 from ..batch.workers import WORKER, Limits, recover_scores, score_with_workers, workers_command
-from ..blender.access import Access
 from ..folders import TEMPORARY, own_folder, sweep
 from ..metric.errors import FileError, FMQMError, SettingsError
-from ..metric.settings import PRESETS, SETTING_NAMES, Settings
 from ..provenance import provenance
 from ..report.atomic_files import STDOUT, check_apart, check_writable
 from ..report.html.pictures import has_pictures, open_report_folder
@@ -40,11 +38,17 @@ from .process import (
     prepare_bpy,
     run_script,
 )
-from .score_arguments import build_parser, check_arguments, digest_of, journal_path, output_files, page_file, shard_of
+from .score_arguments import (
+    build_parser,
+    check_arguments,
+    digest_of,
+    journal_path,
+    options_of,
+    output_files,
+    page_file,
+    shard_of,
+)
 from .score_outputs import exit_code, write_outputs
-
-if TYPE_CHECKING:
-    pass
 
 PROGRAM = "score.py"
 _STRANGERS = 600.0  # seconds that a pair of strangers' files may take
@@ -61,27 +65,9 @@ def main(argv: Sequence[str], out: TextIO, program: str = PROGRAM) -> int:
     parser.out = out
     args = parser.parse_intermixed_args(argv)
     try:
-        chosen = PRESETS[args.preset] | {
-            name: getattr(args, name) for name in SETTING_NAMES if getattr(args, name) is not None
-        }
-        options = Options(
-            Settings(**chosen),
-            args.repeats,
-            args.space,
-            args.match_scale,
-            args.attribution,
-            args.explain,
-            args.report or "",
-            args.both,
-            args.bake,
-            args.max_image_side,
-            args.max_image_bytes,
-            args.untrusted,
-            args.asset_root or "",
-        )
+        options = options_of(args)
         limits = _limits(args)
         check_arguments(args)
-        options.settings.with_seed(options.settings.seed + args.repeats - 1)
         if WORKER in os.environ and not args.worker:
             raise FMQMError("a worker without a shard; this is a fault of the program")
         if args.worker:
@@ -116,14 +102,14 @@ def _limits(args: argparse.Namespace) -> Limits:
     return Limits(args.timeout or _STRANGERS, memory or (total and 0.75 * total))
 
 
-def _rows(args: argparse.Namespace, options: Options) -> list[Row] | None:
+def _rows(args: argparse.Namespace, options: BatchOptions) -> list[Row] | None:
     """The pairs that the arguments name; None for none, which only a merge knows."""
     if args.manifest:
-        rows = read_manifest(args.manifest, options.settings)
+        rows = read_manifest(args.manifest, options.pair.settings)
     elif args.lods:
         prepare_bpy()
         with defer_interrupts():
-            rows = lod_rows(args.lods, Access(options.untrusted, options.asset_root))
+            rows = lod_rows(args.lods, options.reading.access)
     elif args.reference:
         names = glob_files(args.reference, args.glob) if args.glob else args.distorted
         rows = plain_rows(args.reference, names, args.ref_texture or "", args.texture)
@@ -136,7 +122,7 @@ def _rows(args: argparse.Namespace, options: Options) -> list[Row] | None:
 
 
 def _score(
-    args: argparse.Namespace, rows: list[Row], options: Options, limits: Limits, argv: Sequence[str], out: TextIO
+    args: argparse.Namespace, rows: list[Row], options: BatchOptions, limits: Limits, argv: Sequence[str], out: TextIO
 ) -> int:
     """Scores what the journal has not, and writes what it has."""
     versions = provenance(blender_version())

@@ -6,16 +6,22 @@ from __future__ import annotations
 import argparse
 import hashlib
 import os
+from dataclasses import fields
 
 from ..batch.cluster import WAIT
-from ..blender.materials.types import MAX_BAKE
-from ..comparison.alignment import SPACES
+from ..batch.rows import BatchOptions
+from ..batch.workers import Limits
+from ..blender.access import Access
+from ..blender.materials.image_headers import DEFAULT_LIMITS, ImageLimits
+from ..blender.materials.types import Reading
+from ..comparison.pair import PairOptions
 from ..metric.errors import SettingsError
-from ..metric.settings import CENTERS, COLOR_SPACES, POOLINGS, PRESETS, Settings
+from ..metric.settings import PRESETS, SETTING_NAMES, Settings
 from ..report.atomic_files import STDOUT
 from ..report.html.page import PAGE
-from .arguments import OneLineParser, add_access, check_access, flag_of
+from .arguments import OneLineParser, add_access, add_option, check_access, flag_of, settings_of
 
+PAIR_NAMES = tuple(each.name for each in fields(PairOptions) if each.name != "settings")
 _LONGEST_NAME = 255  # bytes, where file systems are common
 
 
@@ -51,7 +57,10 @@ def build_parser(program: str) -> OneLineParser:
         "--jobs", type=int, metavar="N", help="score in N watched processes (default: 1 for more than one pair)"
     )
     batch.add_argument(
-        "--timeout", type=float, metavar="SECONDS", help="a worker may take so long for a pair (default: 3600)"
+        "--timeout",
+        type=float,
+        metavar="SECONDS",
+        help=f"a worker may take so long for a pair (default: {Limits.timeout:g})",
     )
     batch.add_argument("--memory-limit", type=float, metavar="GB", help="a worker may take so much memory")
     batch.add_argument(
@@ -68,50 +77,25 @@ def build_parser(program: str) -> OneLineParser:
 
     settings = parser.add_argument_group("settings (the paper's values are the defaults)")
     settings.add_argument("--preset", choices=PRESETS, default="paper", help="explicit flags win over it")
-    number = Settings()
-    for name, kind, text in (
-        ("samples", int, "target number of samples"),
-        ("patches", int, "number of patches"),
-        ("scored-patches", int, "score only the first K patches (default: all; preset fast: 40)"),
-        ("sigma", float, "deviation of the samples from the surface, in patch diagonals"),
-        ("radius", float, "radius of the color units, in patch diagonals"),
-        ("gradient-radius", float, "radius of the color gradient, in patch diagonals; inf: the whole patch"),
-        ("normal-threshold", float, "|cos| above it is along the normal"),
-        ("tangent-threshold", float, "|cos| below it is in the tangent plane"),
-        ("color-units", int, "color units drawn per patch"),
-        ("seed", int, "of all random draws"),
-    ):
-        default = getattr(number, name.replace("-", "_"))
-        suffix = "" if default is None else f" (default: {default})"
-        settings.add_argument(f"--{name}", type=kind, metavar="N" if kind is int else "X", help=text + suffix)
-    settings.add_argument("--centers", choices=CENTERS, help="choice of patch centers (default: fps)")
-    settings.add_argument("--color-space", choices=COLOR_SPACES, help="of the color features (default: rgb)")
-    settings.add_argument("--pooling", choices=POOLINGS, help="mean of the four features (default: geometric)")
-    settings.add_argument(
-        "--repeats", type=int, default=1, metavar="R", help="seeds seed .. seed+R-1; columns become means, with stderr"
-    )
-    settings.add_argument(
-        "--space", choices=SPACES, default="auto",
-        help="where the two are compared: as they stand in their worlds, in their local spaces, or (default: auto) "
-        "in the world unless another place fits far better",
-    )  # fmt: skip
-    settings.add_argument(
-        "--match-scale", action="store_true", help="undo a difference in size by a factor between units (100, 2.54)"
-    )
-
-    settings.add_argument(
-        "--both", action="store_true", help="score the other direction too, which sees what only the distorted has"
-    )
+    for name in SETTING_NAMES:
+        add_option(settings, Settings, name)
+    for name in PAIR_NAMES:
+        add_option(settings, PairOptions, name)
 
     reading = parser.add_argument_group("reading")
     reading.add_argument(
         "--bake", type=int, metavar="N",
-        help="side of baked images (default: 1024), and a missing base-color image counts as Blender shows it, "
-        "magenta; 0: nothing is baked, plain colors are taken",
+        help=f"side of baked images (default: {Reading.bake}), and a missing base-color image counts as Blender shows "
+        "it, magenta; 0: nothing is baked, plain colors are taken",
     )  # fmt: skip
-    reading.add_argument("--max-image-side", type=int, metavar="N", help="largest side of an image (default: 32768)")
     reading.add_argument(
-        "--max-image-bytes", type=int, metavar="N", help="largest size of a decoded image (default: 1 GiB)"
+        "--max-image-side", type=int, metavar="N", help=f"largest side of an image (default: {DEFAULT_LIMITS.side})"
+    )
+    reading.add_argument(
+        "--max-image-bytes",
+        type=int,
+        metavar="N",
+        help=f"largest size of a decoded image (default: {DEFAULT_LIMITS.decoded})",
     )
 
     add_access(reading)
@@ -130,9 +114,6 @@ def build_parser(program: str) -> OneLineParser:
     output.add_argument("--report", metavar="DIR", help="a web page with pictures: DIR/index.html")
     output.add_argument("--save-fields", metavar="FILE.npz", help="samples, fields and patch scores of the one pair")
     output.add_argument("--picture", metavar="FILE.png", help="reference, distorted and heat map of the one pair")
-    output.add_argument(
-        "--attribution", action="store_true", help="in JSON: geometry's and the texture's part of the loss"
-    )
     output.add_argument("--explain", action="store_true", help="a paragraph a pair: what got worse, where, how surely")
     output.add_argument("--fail-under", type=float, metavar="X", help="exit code 1 if an FMQM is below X")
     output.add_argument("--verbose", action="store_true", help="how far to trust each score: the facts, in a table")
@@ -140,11 +121,24 @@ def build_parser(program: str) -> OneLineParser:
     return parser
 
 
+def options_of(args: argparse.Namespace) -> BatchOptions:
+    """How the pairs are scored, as the arguments have it.
+
+    Raises:
+        SettingsError: a value is out of its range.
+    """
+    given = {name: value for name in PAIR_NAMES if (value := getattr(args, name)) is not None}
+    reading = Reading(
+        bake=Reading.bake if args.bake is None else args.bake,
+        stand_in=bool(args.bake),
+        limits=ImageLimits(args.max_image_side or DEFAULT_LIMITS.side, args.max_image_bytes or DEFAULT_LIMITS.decoded),
+        access=Access(args.untrusted, args.asset_root or ""),
+    )
+    pair = PairOptions(settings=settings_of(args), **given)
+    return BatchOptions(pair=pair, reading=reading, explain=args.explain, report=args.report or "")
+
+
 def check_arguments(args: argparse.Namespace) -> None:
-    if args.repeats < 1:
-        raise SettingsError(f"repeats is {args.repeats}; it must be at least 1")
-    if args.bake is not None and not 0 <= args.bake <= MAX_BAKE:
-        raise SettingsError(f"bake is {args.bake}; it must be between 0 and {MAX_BAKE}")
     for flag in ("max_image_side", "max_image_bytes"):
         limit = getattr(args, flag)
         if limit is not None and limit < 1:

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from ..metric.errors import SettingsError
 from ..metric.evaluation import Scores
-from ..metric.settings import Settings
+from ..metric.settings import Settings, info_of, setting
 from ..metric.stepper import Stepper, Work, as_part
 from ..metric.surface import QueryBuilder, Surface
 from .alignment import SPACES, Alignment, AssetMesh, align
@@ -20,9 +21,9 @@ from .measurement import Comparison, Measurement
 from .surface_facts import Fact
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class PairOptions:
-    """How a pair is scored, and what else is wanted of it.
+    """How pairs are scored, and what else is wanted of them: the one set of options, from a button or a flag to a pair.
 
     Attributes:
         settings: of the metric. repeats: seeds settings.seed to settings.seed + repeats - 1.
@@ -34,17 +35,32 @@ class PairOptions:
     """
 
     settings: Settings = Settings()
-    repeats: int = 1
-    space: str = "auto"
-    match_scale: bool = False
-    both: bool = False
-    attribution: bool = False
+    repeats: int = setting(1, "measure with so many seeds; scores become means, with their standard errors", minimum=1)
+    space: str = setting(
+        "auto",
+        "where the two are compared: as they stand in their worlds, in their local spaces, or (auto) in the world "
+        "unless another place fits far better",
+        choices=SPACES,
+    )
+    match_scale: bool = setting(False, "undo a difference in size by a factor between units, such as 100, 1000 or 2.54")
+    both: bool = setting(
+        False, "score the other direction too, which sees what only the distorted has; takes twice as long"
+    )
+    attribution: bool = setting(
+        False, "score geometry and texture apart too: whose loss it is; takes up to three times as long"
+    )
 
     def __post_init__(self) -> None:
         if not isinstance(self.settings, Settings):
             raise SettingsError(f"settings are {self.settings!r}; they must be Settings(...)")
-        if self.repeats < 1:
-            raise SettingsError(f"repeats is {self.repeats}; it must be at least 1")
+        if fault := info_of(PairOptions, "repeats").fault(self.repeats):
+            raise SettingsError(f"repeats is {self.repeats}; it must be {fault}")
+        self.settings.with_seed(self.settings.seed + self.repeats - 1)  # it raises what is wrong with the last seed
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values of all that decides the scores, under the names of the command line's flags."""
+        rest = {"repeats": self.repeats, "space": self.space, "match_scale": self.match_scale}
+        return self.settings.as_dict() | rest
         if self.space not in SPACES:
             raise SettingsError(f"space is {self.space!r}; it must be one of {', '.join(SPACES)}")
 

@@ -14,14 +14,15 @@ from typing import Any
 import pytest
 
 from fmqm_addon.batch.journal import Journal, Records, line_of, own_record, parse_line, row_key
-from fmqm_addon.batch.rows import Options, Row
+from fmqm_addon.batch.rows import BatchOptions, Row
+from fmqm_addon.comparison.pair import PairOptions
 from fmqm_addon.metric.errors import FileError, SettingsError
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.report.record_check import record_fault
 from fmqm_addon.report.records import SHOWN, PairScore, pair_record
 
 VERSIONS = {"fmqm_version": "1", "blender_version": "5"}
-OPTIONS = Options(Settings())
+OPTIONS = BatchOptions(pair=PairOptions(settings=Settings()))
 
 
 def record(name: str, score: float | None = 0.5) -> dict[str, Any]:
@@ -158,8 +159,8 @@ def test_what_makes_a_pair_new(tmp_path: Path) -> None:
         row_key(replace(row, distorted="d.blend:Other"), OPTIONS, VERSIONS),
         row_key(replace(row, texture=""), OPTIONS, VERSIONS),
         row_key(replace(row, settings=(("seed", 2),)), OPTIONS, VERSIONS),
-        row_key(row, replace(OPTIONS, repeats=2), VERSIONS),
-        row_key(row, Options(Settings(seed=7)), VERSIONS),
+        row_key(row, BatchOptions(pair=PairOptions(repeats=2)), VERSIONS),
+        row_key(row, BatchOptions(pair=PairOptions(settings=Settings(seed=7))), VERSIONS),
         row_key(row, OPTIONS, VERSIONS | {"blender_version": "4"}),
     }
     for name in ("r.glb", "d.blend", "t.png"):

@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 
 from fmqm_addon.batch.manifest import glob_files, plain_rows, read_manifest
-from fmqm_addon.batch.rows import Options, Row, Task, group_by_reference, task_of
+from fmqm_addon.batch.rows import BatchOptions, Row, Task, group_by_reference, task_of
+from fmqm_addon.comparison.pair import PairOptions
 from fmqm_addon.metric.errors import FileError, FMQMError, SettingsError
 from fmqm_addon.metric.settings import Settings
 
@@ -36,7 +37,7 @@ def test_a_csv_and_a_json_manifest_say_the_same(tmp_path: Path) -> None:
     assert first.settings == (("samples", 9000), ("gradient_radius", float("inf")), ("centers", "random"))
     assert (first.id, first.fail_under, second.id, second.fail_under) == ("a, b", 0.9, "lods/rock 2.glb", None)
     assert second.path(second.texture) == str(tmp_path / "b.png") and second.path("") == ""
-    assert Options(SETTINGS).settings_of(first).samples == 9000
+    assert BatchOptions(pair=PairOptions(settings=SETTINGS)).pair_of(first).settings.samples == 9000
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 import fmqm_addon
-from fmqm_addon.batch.rows import Options
+from fmqm_addon.batch.rows import BatchOptions
+from fmqm_addon.comparison.pair import PairOptions
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.provenance import PARTS, code_digest, provenance
 
@@ -49,7 +50,9 @@ def test_what_only_shows_scores_does_not_count(copy: Path) -> None:
 
 
 def test_options_travel_with_it() -> None:
-    made_by = Options(Settings()).made_by({"fmqm_code": "c"})
-    assert made_by == Options(Settings(), report="folder").made_by({"fmqm_code": "c"}), "it changes no score"
-    assert made_by != Options(Settings(), repeats=2).made_by({"fmqm_code": "c"})
-    assert made_by != Options(Settings(seed=1)).made_by({"fmqm_code": "c"})
+    made_by = BatchOptions(pair=PairOptions(settings=Settings())).made_by({"fmqm_code": "c"})
+    assert made_by == BatchOptions(pair=PairOptions(settings=Settings()), report="folder").made_by(
+        {"fmqm_code": "c"}
+    ), "it changes no score"
+    assert made_by != BatchOptions(pair=PairOptions(repeats=2)).made_by({"fmqm_code": "c"})
+    assert made_by != BatchOptions(pair=PairOptions(settings=Settings(seed=1))).made_by({"fmqm_code": "c"})

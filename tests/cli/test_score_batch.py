@@ -20,8 +20,9 @@ import pytest
 
 from fmqm_addon.batch.journal import Journal
 from fmqm_addon.batch.progress_log import Log
-from fmqm_addon.batch.rows import Options, Row, Task
+from fmqm_addon.batch.rows import BatchOptions, Row, Task
 from fmqm_addon.batch.scorer import score_tasks
+from fmqm_addon.comparison.pair import PairOptions
 from fmqm_addon.metric.settings import Settings
 from tests.blender.script import (
     COLUMNS,
@@ -194,7 +195,12 @@ def test_what_nobody_has_foreseen_is_an_error_of_its_pair(
     journal = Journal()
     names = [("ref.obj", "shaken1.obj"), ("shaken2.obj", "ref.obj"), ("ref.obj", "ref.obj")]
     tasks = [Task(str(k), Row(f"id {k}", *pair, folder=str(assets))) for k, pair in enumerate(names)]
-    score_tasks(tasks, Options(Settings(samples=640, patches=20)), journal, Log("", 5, 3, silent=True))
+    score_tasks(
+        tasks,
+        BatchOptions(pair=PairOptions(settings=Settings(samples=640, patches=20))),
+        journal,
+        Log("", 5, 3, silent=True),
+    )
     assert [journal.record(task.key)["error"] for task in tasks] == [
         r"shaken1.obj: MemoryError: Unable to allocate 797 GiB\nfor an array",
         "shaken2.obj: OverflowError: too large",

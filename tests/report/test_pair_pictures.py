@@ -12,9 +12,8 @@ import pytest
 from fmqm_addon.batch import scorer
 from fmqm_addon.batch.journal import Journal
 from fmqm_addon.batch.progress_log import Log
-from fmqm_addon.batch.rows import Options, Row, Task
+from fmqm_addon.batch.rows import BatchOptions, Row, Task
 from fmqm_addon.metric.errors import MeshError, OutputError
-from fmqm_addon.metric.settings import Settings
 from fmqm_addon.report.html.pictures import _write
 
 
@@ -31,8 +30,8 @@ def test_only_output_errors_stop_the_run(monkeypatch: pytest.MonkeyPatch, error:
     def fail(*_: Any) -> None:
         raise error
 
-    working = scorer._Scorer(Options(Settings()), journal := Journal(), Log("", 2, 1, silent=True), None)
-    for name in ("_load", "_tell_memory", "_work"):
+    working = scorer._Scorer(BatchOptions(), journal := Journal(), Log("", 2, 1, silent=True), None)
+    for name in ("_load", "_note_memory", "_work"):
         monkeypatch.setattr(working, name, lambda *_: type("AssetMesh", (), {"world": lambda self: None})())
     monkeypatch.setattr(
         "fmqm_addon.comparison.measurement.Measurement", lambda *_: type("M", (), {"prepare": lambda self: None})()

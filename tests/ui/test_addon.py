@@ -22,9 +22,10 @@ import fmqm_addon
 from fmqm_addon import api
 from fmqm_addon.blender.scene import fingerprint, measure
 from fmqm_addon.blender.scene.target import target_of
+from fmqm_addon.comparison.pair import PairOptions
 from fmqm_addon.metric.errors import SettingsError
 from fmqm_addon.metric.evaluation import COLUMNS
-from fmqm_addon.metric.settings import Settings
+from fmqm_addon.metric.settings import SETTING_NAMES, Settings, info_of
 from fmqm_addon.metric.stepper import Progress, Stepper, Work
 from fmqm_addon.ui import operators, panels, properties, session, stale
 from fmqm_addon.ui.modal import SteppedOperator
@@ -33,7 +34,7 @@ from fmqm_addon.ui.operators import measure as measuring
 from fmqm_addon.ui.properties.items import item_target
 from fmqm_addon.ui.properties.rows import comparable, row_scores, settings_name
 from fmqm_addon.ui.properties.scene import FMQMScene
-from fmqm_addon.ui.properties.settings import metric_settings
+from fmqm_addon.ui.properties.settings import FMQMSettings, metric_settings
 from tests.blender import scenes
 from tests.blender.script import read_json, score
 
@@ -743,7 +744,7 @@ def test_stepping_needs_no_scene(lods: list[bpy.types.Object]) -> None:
     from fmqm_addon.comparison.pair import PairOptions
 
     expected = api.measure(lods[0], lods[1], QUICK)[0].scores
-    stepper = measuring(target_of(lods[0]), [target_of(lods[1])], PairOptions(QUICK))
+    stepper = measuring(target_of(lods[0]), [target_of(lods[1])], PairOptions(settings=QUICK))
     while stepper.progress.stage.startswith("Reading") or not stepper.progress.stage:
         assert stepper.step()
     bpy.data.objects.remove(lods[1])
@@ -756,7 +757,7 @@ def test_the_scene_changes_before_it_is_read(lods: list[bpy.types.Object]) -> No
     from fmqm_addon.blender.scene.target import target_of
     from fmqm_addon.comparison.pair import PairOptions
 
-    stepper = measuring(target_of(lods[0]), [target_of(lod) for lod in lods[1:]], PairOptions(QUICK))
+    stepper = measuring(target_of(lods[0]), [target_of(lod) for lod in lods[1:]], PairOptions(settings=QUICK))
     stepper.step()
     bpy.data.objects.remove(lods[2])
     outcomes = stepper.run()
@@ -788,3 +789,18 @@ def test_python_ends_after_the_add_on(handlers: bool) -> None:
     lines.append("fmqm_addon.unregister()")
     done = subprocess.run([sys.executable, "-c", "\n".join(lines)], cwd=ROOT, timeout=60, check=False)
     assert done.returncode == 0
+
+
+def test_the_sidebar_has_the_defaults_limits_and_texts_of_the_settings() -> None:
+    properties = FMQMSettings.bl_rna.properties
+    for owner, names in ((Settings, SETTING_NAMES), (PairOptions, ("repeats", "match_scale", "both", "attribution"))):
+        for name in names:
+            info, found = info_of(owner, name), properties[name]
+            assert found.description.lower() == info.text.lower()
+            default = getattr(owner, name)
+            if default is not None:
+                assert found.default == (pytest.approx(default, rel=1e-6) if info.kind is float else default)
+            if info.kind in (int, float):
+                assert found.hard_min >= info.minimum and (info.maximum is None or found.hard_max <= info.maximum)
+            if info.choices:
+                assert tuple(item.identifier for item in found.enum_items) == info.choices

@@ -12,7 +12,6 @@ import numpy as np
 
 from ...blender.scene.measure import Outcome, measuring
 from ...blender.scene.target import target_of
-from ...comparison.pair import PairOptions
 from ...metric.errors import FMQMError
 from ...report.trust_table import trust_dict
 from .. import session, stale
@@ -20,7 +19,7 @@ from ..modal import SteppedOperator
 from ..properties.items import item_target
 from ..properties.rows import numbers_text, row_targets
 from ..properties.scene import FMQMScene
-from ..properties.settings import metric_settings
+from ..properties.settings import pair_options
 from ..view.shown import forget_removed
 from .inputs import reference_of
 
@@ -59,22 +58,17 @@ class FMQM_OT_measure(SteppedOperator, bpy.types.Operator):  # noqa: N801
     def begin(self, context: bpy.types.Context) -> bool:
         fmqm = context.scene.fmqm
         try:
-            settings = metric_settings(fmqm.settings)
+            options = pair_options(fmqm.settings)
         except FMQMError as error:
             self.report({"ERROR"}, str(error))
             return False
-        asked = {
-            "repeats": fmqm.settings.repeats,
-            "space": fmqm.settings.space.lower(),
-            "match_scale": fmqm.settings.match_scale,
-        }
         compared = [target_of(target) for item in fmqm.compared if (target := item_target(item)) is not None]
         self._scene = context.scene.name_full
-        self._settings_text = json.dumps({**settings.as_dict(), **asked})
+        self._settings_text = json.dumps(options.as_dict())
         self.stepper = measuring(
             target_of(reference_of(fmqm), fmqm.bare_reference),
             list(dict.fromkeys(compared)),
-            PairOptions(settings, **asked, both=fmqm.settings.both, attribution=fmqm.settings.attribution),
+            options,
         )
         return True
 

@@ -15,10 +15,17 @@ from bpy.props import (
     IntProperty,
 )
 
-from ...comparison.alignment import SPACES
-from ...metric.settings import FAST_SCORED_PATCHES, SETTING_NAMES, Settings
+from ...comparison.pair import PairOptions
+from ...metric.settings import (
+    FAST_SCORED_PATCHES,
+    MIN_SAMPLES_PER_PATCH,
+    SETTING_NAMES,
+    Settings,
+    info_of,
+)
 
-SEED_LIMIT = 2**31 - 1  # of an IntProperty
+INT_LIMIT = 2**31 - 1  # of an IntProperty
+_SMALLEST, _LARGEST = 1e-6, 10**6  # of numbers that must be above 0, and of those without a limit
 CUSTOM = "CUSTOM"
 
 
@@ -39,8 +46,28 @@ def _value_changed(settings: FMQMSettings, _: bpy.types.Context) -> None:
         settings.preset = CUSTOM
 
 
+def _about(name: str, owner: type = Settings, /, **more: Any) -> dict[str, Any]:
+    """What a property shares with the flag of the same name: default, limits, text.
+
+    Args:
+        more: what is of the property alone, or differs.
+    """
+    info = info_of(owner, name)
+    about: dict[str, Any] = {
+        "name": name.replace("_", " ").title(),
+        "description": info.text[0].upper() + info.text[1:],
+        "default": getattr(owner, name),
+    }
+    if info.kind in (int, float):
+        most = info.kind(_LARGEST if info.maximum is None else info.maximum)
+        about |= {"min": _SMALLEST if info.above else info.minimum, "max": min(most, INT_LIMIT)}
+    if owner is Settings:
+        about["update"] = _value_changed
+    return about | more
+
+
 class FMQMSettings(bpy.types.PropertyGroup):
-    """Every option of scripts/score.py."""
+    """Every setting of the metric and every option of a pair."""
 
     preset: EnumProperty(
         name="Preset",
@@ -53,99 +80,50 @@ class FMQMSettings(bpy.types.PropertyGroup):
         default="PAPER",
         update=_preset_chosen,
     )
-    samples: IntProperty(
-        name="Samples",
-        description="Target number of points near the surface at which both meshes are compared",
-        default=200_000, min=32, max=100_000_000, soft_max=1_000_000, step=10_000, update=_value_changed,
-    )  # fmt: skip
-    patches: IntProperty(
-        name="Patches",
-        description="Number of patches that the reference is divided into",
-        default=250, min=1, max=1_000_000, soft_max=2_000, update=_value_changed,
-    )  # fmt: skip
+    samples: IntProperty(**_about("samples", min=MIN_SAMPLES_PER_PATCH), soft_max=1_000_000, step=10_000)
+    patches: IntProperty(**_about("patches"), soft_max=2_000)
     score_all: BoolProperty(
         name="Score All Patches",
         description="Score every patch. Otherwise only the first ones, which are spread evenly",
         default=True, update=_value_changed,
     )  # fmt: skip
-    scored_patches: IntProperty(
-        name="Scored Patches",
-        description="How many patches are scored, at full density",
-        default=FAST_SCORED_PATCHES, min=1, max=1_000_000, soft_max=2_000, update=_value_changed,
-    )  # fmt: skip
-    sigma: FloatProperty(
-        name="Sigma",
-        description="Standard deviation of the samples' distance from the surface, in patch diagonals",
-        default=0.05, min=0.0, max=1e6, soft_max=0.5, step=1, precision=3, update=_value_changed,
-    )  # fmt: skip
-    radius: FloatProperty(
-        name="Radius",
-        description="Radius of the surroundings in which colors are compared, in patch diagonals",
-        default=0.125, min=1e-6, max=1e6, soft_max=1.0, step=1, precision=3, update=_value_changed,
-    )  # fmt: skip
+    scored_patches: IntProperty(**_about("scored_patches", default=FAST_SCORED_PATCHES), soft_max=2_000)
+    sigma: FloatProperty(**_about("sigma"), soft_max=0.5, step=1, precision=3)
+    radius: FloatProperty(**_about("radius"), soft_max=1.0, step=1, precision=3)
     radius_whole: BoolProperty(
         name="Whole Patch for Colors",
         description="Compare colors over the whole patch instead of within the radius",
         default=False, update=_value_changed,
     )  # fmt: skip
-    gradient_radius: FloatProperty(
-        name="Gradient Radius",
-        description="Radius within which the steepest color change is looked for, in patch diagonals",
-        default=0.125, min=1e-6, max=1e6, soft_max=1.0, step=1, precision=3, update=_value_changed,
-    )  # fmt: skip
+    gradient_radius: FloatProperty(**_about("gradient_radius"), soft_max=1.0, step=1, precision=3)
     gradient_whole: BoolProperty(
         name="Whole Patch for Gradients",
         description="Look for the steepest color change over the whole patch instead of within the gradient radius",
         default=False, update=_value_changed,
     )  # fmt: skip
-    normal_threshold: FloatProperty(
-        name="Normal Threshold",
-        description="Absolute cosine above which a direction counts as along the normal",
-        default=0.95, min=0.0, max=1.0, step=1, precision=3, update=_value_changed,
-    )  # fmt: skip
-    tangent_threshold: FloatProperty(
-        name="Tangent Threshold",
-        description="Absolute cosine below which a direction counts as in the tangent plane",
-        default=0.05, min=0.0, max=1.0, step=1, precision=3, update=_value_changed,
-    )  # fmt: skip
-    color_units: IntProperty(
-        name="Color Units",
-        description="Samples of a patch whose surroundings the color features look at",
-        default=100, min=1, max=1_000_000, soft_max=1_000, update=_value_changed,
-    )  # fmt: skip
+    normal_threshold: FloatProperty(**_about("normal_threshold"), step=1, precision=3)
+    tangent_threshold: FloatProperty(**_about("tangent_threshold"), step=1, precision=3)
+    color_units: IntProperty(**_about("color_units"), soft_max=1_000)
     centers: EnumProperty(
-        name="Centers",
-        description="How the patch centers are chosen",
+        **_about("centers"),
         items=[
             ("fps", "Farthest Points", "Spread evenly over the surface"),
             ("random", "Random", "Drawn at random, by the seed"),
         ],
-        update=_value_changed,
-    )  # fmt: skip
+    )
     color_space: EnumProperty(
-        name="Color Space",
-        description="Color space of the two color features",
+        **_about("color_space"),
         items=[("rgb", "RGB", "sRGB, as in the paper"), ("lab", "Lab", "CIE L*a*b*, with lightness weighted 6:1:1")],
-        update=_value_changed,
-    )  # fmt: skip
+    )
     pooling: EnumProperty(
-        name="Pooling",
-        description="Mean of a patch's four features",
+        **_about("pooling"),
         items=[
             ("geometric", "Geometric", "As in the paper: one bad feature pulls the score down"),
             ("arithmetic", "Arithmetic", "The plain mean of the four"),
         ],
-        update=_value_changed,
-    )  # fmt: skip
-    seed: IntProperty(
-        name="Seed", description="Of all random draws: the same seed gives the same numbers", default=0, min=0,
-        max=SEED_LIMIT,
-    )  # fmt: skip
-    repeats: IntProperty(
-        name="Repeats",
-        description="Measure with so many seeds. Scores become means, with their standard errors",
-        default=1, min=1, max=1_000, soft_max=10,
-    )  # fmt: skip
+    )
+    seed: IntProperty(**_about("seed", update=None))
+    repeats: IntProperty(**_about("repeats", PairOptions, max=1_000), soft_max=10)
     space: EnumProperty(
         name="Space",
         description="Where the objects are compared",
@@ -154,23 +132,11 @@ class FMQMSettings(bpy.types.PropertyGroup):
             ("WORLD", "World", "Where they stand in the scene"),
             ("LOCAL", "Local", "Without their transforms: each moved onto the reference by its own origin and axes"),
         ],
-        default="AUTO",
+        default=PairOptions.space.upper(),
     )
-    match_scale: BoolProperty(
-        name="Match Scale",
-        description="Undo a difference in size by a factor between units, such as 100, 1000 or 2.54",
-        default=False,
-    )
-    both: BoolProperty(
-        name="Both Directions",
-        description="Score the compared as the reference too, which sees what only it has. Takes twice as long",
-        default=False,
-    )
-    attribution: BoolProperty(
-        name="Attribution",
-        description="Score geometry and texture apart too: whose loss it is. Takes up to three times as long",
-        default=False,
-    )
+    match_scale: BoolProperty(**_about("match_scale", PairOptions))
+    both: BoolProperty(**_about("both", PairOptions, name="Both Directions"))
+    attribution: BoolProperty(**_about("attribution", PairOptions))
 
 
 # In the order in which operator presets save them; space and seed are the scene's, not a preset's.
@@ -189,7 +155,7 @@ _PRESET_VALUES: dict[str, dict[str, Any]] = {
     "PAPER": _PAPER,
     "FAST": {**_PAPER, "score_all": False, "scored_patches": FAST_SCORED_PATCHES},
 }
-assert {space.upper() for space in SPACES} == {"AUTO", "WORLD", "LOCAL"}
+assert {space.upper() for space in info_of(PairOptions, "space").choices} == {"AUTO", "WORLD", "LOCAL"}
 
 
 def plain(value: Any) -> Any:
@@ -211,6 +177,22 @@ def metric_settings(settings: FMQMSettings) -> Settings:
     if settings.gradient_whole:
         values["gradient_radius"] = math.inf
     return Settings(**values)
+
+
+def pair_options(settings: FMQMSettings) -> PairOptions:
+    """All that is asked about pairs.
+
+    Raises:
+        SettingsError: as metric_settings.
+    """
+    return PairOptions(
+        settings=metric_settings(settings),
+        repeats=settings.repeats,
+        space=settings.space.lower(),
+        match_scale=settings.match_scale,
+        both=settings.both,
+        attribution=settings.attribution,
+    )
 
 
 CLASSES = (FMQMSettings,)

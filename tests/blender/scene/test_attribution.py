@@ -214,7 +214,9 @@ def said() -> list[str]:
 def test_attribution_from_python_and_its_progress(monkeys: list[bpy.types.Object]) -> None:
     """Its progress is a part of its object's; it changes no score."""
     plain = api.measure(*monkeys, SMALL, both=True)[0]
-    stepper = measuring(target_of(monkeys[0]), [target_of(monkeys[1])], PairOptions(SMALL, both=True, attribution=True))
+    stepper = measuring(
+        target_of(monkeys[0]), [target_of(monkeys[1])], PairOptions(settings=SMALL, both=True, attribution=True)
+    )
     seen = [("", 0.0)]
     while stepper.step():
         seen.append((stepper.progress.stage, stepper.progress.done))

@@ -183,7 +183,7 @@ def test_inputs_of_geometry_nodes_are_noticed() -> None:
 def test_kinds_score_1_against_themselves(make: Callable[[], bpy.types.Object]) -> None:
     object_ = make()
     (outcome,) = measuring(
-        target_of(object_), [target_of(object_)], PairOptions(Settings(samples=800, patches=8))
+        target_of(object_), [target_of(object_)], PairOptions(settings=Settings(samples=800, patches=8))
     ).run()
     assert outcome.error is None and list(outcome.scores) == [1.0] * 5
 
@@ -750,7 +750,7 @@ def test_the_panel_says_that_it_bakes() -> None:
     next(node for node in tree.nodes if node.type == "SET_MATERIAL").inputs["Material"].default_value = procedural()
     few = Settings(samples=400, patches=4)
     compared = [target_of(instances), target_of(plain), target_of(nodes)]
-    stepper = measuring(target_of(stone), compared, PairOptions(few), Reading(bake=32))
+    stepper = measuring(target_of(stone), compared, PairOptions(settings=few), Reading(bake=32))
     stages = []
     while stepper.step():
         stages.append(stepper.progress.stage)

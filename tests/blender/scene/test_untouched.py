@@ -74,7 +74,7 @@ def test_nothing_of_the_scene_changes(mode: str, painting: bool, tmp_path: Path)
     assert image.is_dirty == painting
     compared = [target_of(hidden), target_of(shelf), target_of(crate, bare=True)]
     few = Settings(samples=400, patches=4)
-    outcomes = measuring(target_of(crate), compared, PairOptions(few), Reading(bake=32)).run()
+    outcomes = measuring(target_of(crate), compared, PairOptions(settings=few), Reading(bake=32)).run()
     assert all(outcome.error is None for outcome in outcomes)
     # What the baker of 4.5 would lose, it must not be given.
     baked = not painting or bpy.app.version >= (5, 2)
