@@ -119,10 +119,11 @@ def test_only_workers_with_the_same_code_score(
 ) -> None:
     """One has ours, one has none, one has a metric that gives other numbers."""
     address, workers = cluster
-    for name in ("fmqm_addon", "scripts"):
-        shutil.copytree(Path(ROOT, name), assets / "other" / name)
+    shutil.copytree(Path(ROOT, "fmqm_addon"), assets / "other" / "fmqm_addon")
     changed = assets / "other" / "fmqm_addon" / "metric" / "settings.py"
-    changed.write_text(changed.read_text().replace("sigma: float = 0.05", "sigma: float = 0.06"))
+    text = changed.read_text()
+    assert '0.05, "standard deviation' in text
+    changed.write_text(text.replace('0.05, "standard deviation', '0.06, "standard deviation'))
     wait_for(address, len(workers))
     command = ["--manifest", "pairs.json", *TINY, "--quiet"]
     done = score(*command, "--json", "far.json", "--dask", address, cwd=assets)
