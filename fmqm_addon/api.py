@@ -19,9 +19,10 @@ from .blender.scene.measure import Outcome, measuring
 from .blender.scene.target import target_of
 from .comparison.pair import PairOptions
 from .metric.evaluation import COLUMNS, Result, Scores
+from .metric.perceived import Perceived
 from .metric.settings import PRESETS, Settings
 
-__all__ = ["COLUMNS", "PRESETS", "Outcome", "Result", "Scores", "Settings", "measure"]
+__all__ = ["COLUMNS", "PRESETS", "Outcome", "Perceived", "Result", "Scores", "Settings", "measure"]
 
 Asset: TypeAlias = bpy.types.Object | bpy.types.Collection
 _ASSETS = (bpy.types.Object, bpy.types.Collection)
@@ -49,13 +50,14 @@ def measure(
         repeats: measure with so many seeds; scores become means.
         reference_without_modifiers: the reference is its mesh without modifiers, so that an object can be
             measured against itself.
-        both: score the other direction too: `outcome.reverse`, Scores as well.
+        both: score the other direction too: `outcome.reverse` and `outcome.reverse_perceived`.
         attribution: score geometry and texture apart too: `outcome.attribution`, whose loss it is.
         bake: side in pixels of the images onto which materials are baked that cannot be read; 0 forbids it.
 
     Returns:
         One outcome per distorted asset, in their order; `outcome.scores` are Scores, a named tuple in the order
-        of COLUMNS, or None with the reason in `outcome.error`. `outcome.comparison.result` is a Result of
+        of COLUMNS, or None with the reason in `outcome.error`; `outcome.perceived` is Perceived, a named tuple of
+        the second reading: score, shape, facing, color, detail, p10. `outcome.comparison.result` is a Result of
         metric.evaluation with patches, samples and fields, `outcome.trust` a comparison.trust.Trust: how far to
         believe the scores.
 

@@ -11,6 +11,7 @@ import numpy as np
 from ..metric.errors import MeshError
 from ..metric.evaluation import Evaluation, Result, Scores
 from ..metric.geometry import Floats
+from ..metric.perceived import Perceived
 from ..metric.settings import Settings
 from ..metric.stepper import Progress, Stepper, Work, as_part, as_work
 from ..metric.surface import MeshArrays, QueryBuilder, Surface, preparing_surface
@@ -19,24 +20,31 @@ from .trust import Trust, assessing
 
 
 @dataclass(frozen=True)
-class Comparison:
-    """Scores of one distorted mesh.
+class Readings:
+    """Both readings of the samples of a pair, FMQM and perceived: means over the seeds.
 
     Attributes:
-        scores: means over the seeds.
-        stderr: standard errors of these means; None for one seed.
-        perceived: (5,) float64 in the order of metric.perceived.PERCEIVED_COLUMNS, mean over the seeds.
-        perceived_p10: 10th percentile of perceived over the patches, mean over the seeds.
-        perceived_stderr: (6,) standard errors of these five and of perceived_p10; None for one seed.
-        result: of the first seed, with patches and fields. distorted: the prepared surface.
-        trust: what is known about the scores, from the first seed.
+        scores: the paper's. perceived: the second reading.
+        stderr, perceived_stderr: standard errors of these means; None for one seed.
+        fmqm_p10: 10th percentile of FMQM over the patches.
     """
 
     scores: Scores
     stderr: Scores | None
-    perceived: Floats
-    perceived_p10: float
-    perceived_stderr: Floats | None
+    fmqm_p10: float
+    perceived: Perceived
+    perceived_stderr: Perceived | None
+
+
+@dataclass(frozen=True)
+class Comparison(Readings):
+    """Scores of one distorted mesh.
+
+    Attributes:
+        result: of the first seed, with patches and fields. distorted: the prepared surface.
+        trust: what is known about the scores, from the first seed.
+    """
+
     result: Result
     distorted: Surface
     trust: Trust
@@ -80,8 +88,8 @@ class Measurement:
         """
         return Stepper(self._compare(distorted, known))
 
-    def reverse(self, distorted: MeshArrays) -> Stepper[Scores]:
-        """A stepper over the other direction, the distorted mesh as the reference: mean scores over the seeds.
+    def reverse(self, distorted: MeshArrays) -> Stepper[Readings]:
+        """A stepper over the other direction, the distorted mesh as the reference.
 
         Sees what only the distorted mesh has, and costs a preparation of its own.
         """
@@ -102,25 +110,19 @@ class Measurement:
             self._facts = yield from as_work(surface_facts(self.reference), "features", 0.92, 0.96)
         assessed = assessing(self.reference, surface, results[0], self._facts)
         trust = yield from as_work(assessed, "features", 0.96, 1.0)
-        scores, stderr = _mean([result.scores for result in results])
-        perceived, perceived_stderr = _mean([(*result.perceived, result.perceived_p10) for result in results])
-        errors = None if stderr is None else Scores(*stderr.tolist())
+        readings = _means(results)
         return Comparison(
-            scores=Scores(*scores.tolist()),
-            stderr=errors,
-            perceived=perceived[:-1],
-            perceived_p10=float(perceived[-1]),
-            perceived_stderr=perceived_stderr,
+            **vars(readings),
             result=results[0],
             distorted=surface,
-            trust=replace(trust, pair=(*known, *trust.pair, _error_fact(errors, len(results)))),
+            trust=replace(trust, pair=(*known, *trust.pair, _error_fact(readings.stderr, len(results)))),
         )
 
-    def _reverse(self, distorted: MeshArrays) -> Work[Scores]:
+    def _reverse(self, distorted: MeshArrays) -> Work[Readings]:
         other = Measurement(distorted, self._build_query, self._settings, self._repeats)
         yield from as_part(other.prepare(), 0.0, 0.5)
         _, results = yield from other._results(self._mesh, 0.5, 0.5)
-        return Scores(*_mean([result.scores for result in results])[0].tolist())
+        return _means(results)
 
     def _results(self, distorted: MeshArrays, first: float, share: float) -> Work[tuple[Surface, list[Result]]]:
         """The prepared mesh and its result for each seed; progress goes from first on by the share."""
@@ -143,10 +145,24 @@ class Measurement:
         return surface, results
 
 
-def _mean(rows: Sequence[Sequence[float]]) -> tuple[Floats, Floats | None]:
-    """The mean over the seeds, and its standard error; None for one seed."""
-    stderr = np.std(rows, axis=0, ddof=1) / np.sqrt(len(rows)) if len(rows) > 1 else None
-    return np.mean(rows, axis=0), stderr
+def _means(results: Sequence[Result]) -> Readings:
+    """Over the seeds."""
+    scores: Floats = np.array([result.scores for result in results])
+    perceived: Floats = np.array([result.perceived for result in results])
+    several = len(results) > 1
+    return Readings(
+        scores=Scores(*scores.mean(axis=0).tolist()),
+        stderr=Scores(*_standard_error(scores)) if several else None,
+        fmqm_p10=float(np.mean([result.fmqm_p10 for result in results])),
+        perceived=Perceived(*perceived.mean(axis=0).tolist()),
+        perceived_stderr=Perceived(*_standard_error(perceived)) if several else None,
+    )
+
+
+def _standard_error(rows: Floats) -> list[float]:
+    """Of the means of columns."""
+    errors: list[float] = (np.std(rows, axis=0, ddof=1) / np.sqrt(len(rows))).tolist()
+    return errors
 
 
 def _error_fact(stderr: Scores | None, repeats: int) -> Fact:

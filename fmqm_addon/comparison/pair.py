@@ -11,13 +11,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..metric.errors import SettingsError
-from ..metric.evaluation import Scores
 from ..metric.settings import Settings, info_of, setting
 from ..metric.stepper import Stepper, Work, as_part
 from ..metric.surface import QueryBuilder, Surface
 from .alignment import SPACES, Alignment, AssetMesh, align
 from .attribution import Attribution, attribute
-from .measurement import Comparison, Measurement
+from .measurement import Comparison, Measurement, Readings
 from .surface_facts import Fact
 
 
@@ -71,14 +70,14 @@ class PairResult:
 
     Attributes:
         reference: the prepared surface; comparison holds the other one.
-        reverse: scores of the other direction; None: not asked for.
+        reverse: readings of the other direction; None: not asked for.
         attribution: whose loss it is; None: not asked for.
     """
 
     reference: Surface
     alignment: Alignment
     comparison: Comparison
-    reverse: Scores | None
+    reverse: Readings | None
     attribution: Attribution | None
 
     @property

@@ -21,7 +21,14 @@ from .features import FieldValues, features_of_patches, pairs_of_patches, pool_f
 from .fields import Fields, evaluate_fields
 from .geometry import Floats, Ints, morton_order
 from .patches import Patch, PatchMesh, build_patch_mesh, choose_centers, grow_patches
-from .perceived import LOW_PERCENTILE, PERCEIVED_COLUMNS, RADIUS, perceived_of_patches
+from .perceived import (
+    PERCEIVED_COLUMNS,
+    RADIUS,
+    Perceived,
+    low_percentile,
+    perceived_of_pair,
+    perceived_of_patches,
+)
 from .sampling import Samples, draw_samples, join_samples
 from .settings import Settings
 from .stepper import Progress, Stepper, Work, as_work
@@ -50,9 +57,9 @@ class Result:
     Attributes:
         scores: means over the patches.
         patch_scores: (P, 5) float64, in the order of COLUMNS.
-        perceived: (5,) float64 means over the patches, in the order of perceived.PERCEIVED_COLUMNS.
-        perceived_p10: 10th percentile of perceived over the patches, linear between ranks.
-        patch_perceived: (P, 5) float64, in the same order.
+        fmqm_p10: 10th percentile of FMQM over the patches.
+        perceived: the second reading of the same samples, means over the patches.
+        patch_perceived: (P, 5) float64, in the order of perceived.PERCEIVED_COLUMNS.
         patch_mesh: the reference as the patches see it; their faces are its triangles.
         patches: the P patches, on patch_mesh. patch_centers: (P, 3) metric's frame.
         samples: N sample points. ref, dist: the fields of both surfaces there; metric's frame.
@@ -63,8 +70,8 @@ class Result:
     settings: Settings
     scores: Scores
     patch_scores: Floats
-    perceived: Floats
-    perceived_p10: float
+    fmqm_p10: float
+    perceived: Perceived
     patch_perceived: Floats
     patch_mesh: PatchMesh
     patches: tuple[Patch, ...]
@@ -74,6 +81,12 @@ class Result:
     dist: Fields
     frame: Frame
     warnings: tuple[str, ...]
+
+    def of_patches(self, column: str) -> Floats:
+        """(P,) one of COLUMNS or of perceived.PERCEIVED_COLUMNS."""
+        if column in COLUMNS:
+            return self.patch_scores[:, COLUMNS.index(column)]
+        return self.patch_perceived[:, PERCEIVED_COLUMNS.index(column)]
 
 
 @dataclass(frozen=True)
@@ -171,8 +184,8 @@ class Evaluation:
             settings=settings,
             scores=Scores(*patch_scores.mean(axis=0).tolist()),
             patch_scores=patch_scores,
-            perceived=perceived.mean(axis=0),
-            perceived_p10=float(np.percentile(perceived[:, -1], LOW_PERCENTILE)),
+            fmqm_p10=low_percentile(patch_scores[:, -1]),
+            perceived=perceived_of_pair(perceived),
             patch_perceived=perceived,
             patch_mesh=prepared.patch_mesh,
             patches=prepared.patches,

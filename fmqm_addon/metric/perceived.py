@@ -7,20 +7,32 @@ Equal inputs cancel exactly, as in the paper's features: both sides of a ratio c
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from .features import FieldValues, Pairs
 from .geometry import Floats, Ints, cross, dot
 
-PERCEIVED_COLUMNS = ("shape", "facing", "color", "detail", "perceived")
+
+class Perceived(NamedTuple):
+    """Perceived quality of a pair and what it is made of, each in [0, 1]; 1 is a mesh against itself."""
+
+    score: float
+    shape: float
+    facing: float
+    color: float
+    detail: float
+    p10: float  # of the score, over the patches
+
+
+PERCEIVED_COLUMNS = ("shape", "facing", "color", "detail", "perceived")  # of a patch
 
 RADIUS = 0.125  # of the color units, in L: about 96 samples, enough for moments
 C1, C2 = 0.01**2, 0.03**2  # SSIM's constants for colors in [0, 1]: contrast below them is not seen
 K = 4 * C2 / RADIUS**2  # C2 as a squared slope over a disc of that radius
 RIDGE = 1e-5  # L^2, added to the variances of positions: a unit that lies in a plane has no slope across it
-LOW_PERCENTILE = 10  # worst places count for people
+LOW_PERCENTILE = 10
 
 
 def perceived_of_patches(
@@ -50,6 +62,17 @@ def perceived_of_patches(
         row[3] = detail[:, its_units].mean(axis=1).mean()
     table[:, 4] = table[:, :4].prod(axis=1) ** 0.25
     return table
+
+
+def perceived_of_pair(table: Floats) -> Perceived:
+    """Means over the patches of perceived_of_patches' (P, 5) table."""
+    *features, score = table.mean(axis=0).tolist()
+    return Perceived(score, *features, low_percentile(table[:, -1]))
+
+
+def low_percentile(of_patches: Floats) -> float:
+    """The 10th percentile of (P,) scores, linear between ranks: worst places count for people."""
+    return float(np.percentile(of_patches, LOW_PERCENTILE))
 
 
 def side(values: Floats) -> Floats:

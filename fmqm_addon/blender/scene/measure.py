@@ -9,11 +9,12 @@ from dataclasses import dataclass, field
 
 from ...comparison.alignment import Alignment, AssetMesh, location_counts
 from ...comparison.attribution import Attribution
-from ...comparison.measurement import Comparison
+from ...comparison.measurement import Comparison, Readings
 from ...comparison.pair import PairOptions, PairResult, comparing_pair, measurement_of
 from ...comparison.trust import Trust
 from ...metric.errors import FMQMError
 from ...metric.evaluation import Scores
+from ...metric.perceived import Perceived
 from ...metric.stepper import Progress, Stepper, Work, as_part
 from ..materials.images import TextureCache
 from ..materials.types import Reading
@@ -58,6 +59,11 @@ class Outcome:
         return None if self.comparison is None else self.comparison.scores
 
     @property
+    def perceived(self) -> Perceived | None:
+        """The second reading, means over the patches and seeds; None where there is an error."""
+        return None if self.comparison is None else self.comparison.perceived
+
+    @property
     def trust(self) -> Trust | None:
         """How far to trust the scores; None where there is an error."""
         return None if self.comparison is None else self.comparison.trust
@@ -65,6 +71,15 @@ class Outcome:
     @property
     def reverse(self) -> Scores | None:
         """Scores of the other direction; None where they were not asked for, or there is an error."""
+        return None if self._reverse is None else self._reverse.scores
+
+    @property
+    def reverse_perceived(self) -> Perceived | None:
+        """The second reading of the other direction; None as reverse is."""
+        return None if self._reverse is None else self._reverse.perceived
+
+    @property
+    def _reverse(self) -> Readings | None:
         return None if self.pair_result is None else self.pair_result.reverse
 
     @property
