@@ -22,6 +22,7 @@ except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
 from ..metric.errors import FileError, SettingsError
+from ..report.criteria import Criteria
 from ..report.record_check import checked_json, record_fault
 from ..report.records import PairScore, pair_record
 from .rows import BatchOptions, Row
@@ -252,13 +253,12 @@ def differences(found: Mapping[str, Any], wanted: Mapping[str, Any], names: Iter
 class Records:
     """The records of rows in their order, as the outputs want them; read anew each time, so that none is kept."""
 
-    def __init__(self, rows: Sequence[Row], keys: Sequence[str], journal: Journal, fail_under: float | None) -> None:
+    def __init__(self, rows: Sequence[Row], keys: Sequence[str], journal: Journal, criteria: Criteria) -> None:
         self._rows = rows
         self._keys = keys
         self._journal = journal
-        self._fail_under = fail_under
+        self._criteria = criteria
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
         for row, key in zip(self._rows, self._keys, strict=True):
-            limit = self._fail_under if row.fail_under is None else row.fail_under
-            yield self._journal.record(key) | row.record_fields() | {"fail_under": limit}
+            yield self._journal.record(key) | row.record_fields() | self._criteria.told(row.fail_under)

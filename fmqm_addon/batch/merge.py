@@ -7,12 +7,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from ..metric.errors import FileError
+from ..report.criteria import ANYTHING, TOLD, Criteria
 from ..report.record_check import checked_json, is_settings, record_fault
 from .journal import Journal, differences
 from .progress_log import Log
 from .rows import Row
 
-_REQUIRED = ("settings", "fail_under")  # what a record of an output has besides
+_REQUIRED = ("settings", *TOLD)  # what a record of an output has besides
 _MADE_BY = ("fmqm_version", "fmqm_code", "blender_version")
 
 
@@ -23,7 +24,7 @@ class Merged:
         rows: give the order, and which there should be. None takes what the parts have: in the order of the whole,
             where they know which shards they are.
         log: gets a line for ids that are there twice (the first counts), missing, or not among the rows.
-        fail_under: of pairs whose row has none; None leaves those of the parts.
+        criteria: what it does not say stays as the parts have it; a row's own threshold wins.
 
     Attributes:
         settings, versions: as json_parts wants them.
@@ -34,10 +35,10 @@ class Merged:
     """
 
     def __init__(
-        self, paths: Sequence[str], rows: Sequence[Row] | None, log: Log, fail_under: float | None = None
+        self, paths: Sequence[str], rows: Sequence[Row] | None, log: Log, criteria: Criteria = ANYTHING
     ) -> None:
         self._journal = Journal()
-        self._fail_under = fail_under
+        self._criteria = criteria
         self._rows = {row.id: row for row in rows or ()}
         self._ids: list[str] = []
         self._others: dict[str, str] = {}  # why a record of this id is not that of its row
@@ -75,12 +76,11 @@ class Merged:
     def __iter__(self) -> Iterator[dict[str, Any]]:
         for name in self._ids:
             row = self._rows.get(name)
-            limit = self._fail_under if row is None or row.fail_under is None else row.fail_under
+            own = None if row is None else row.fail_under
             if name in self._journal:
-                record = self._journal.record(name)
-                yield record if limit is None else record | {"fail_under": limit}
+                yield self._journal.record(name) | self._criteria.wished(own)
             elif row is not None:
-                yield row.failed(self._gap(row)) | {"fail_under": limit}
+                yield row.failed(self._gap(row)) | self._criteria.told(own)
 
     def _gap(self, row: Row) -> str:
         """Why there is no record."""

@@ -13,6 +13,7 @@ from typing import Any
 from ..blender.files.asset_path import split_spec
 from ..blender.materials.image_headers import DEFAULT_LIMITS
 from ..blender.materials.types import Reading
+from ..comparison.judge import Judge
 from ..comparison.pair import PairOptions
 from ..report.records import PairScore, pair_record
 
@@ -25,13 +26,14 @@ class BatchOptions:
         pair: of every pair, before a row's own settings.
         reading: of all assets, textures of their own aside.
         explain: in words, too.
-        report: folder of the report, for pictures; "" makes none. It changes no score.
+        report: folder of the report, for pictures; "" makes none. judge: which reading they show. They change no score.
     """
 
     pair: PairOptions = PairOptions()
     reading: Reading = Reading()
     explain: bool = False
     report: str = ""
+    judge: Judge = Judge.FMQM
 
     def pair_of(self, row: Row) -> PairOptions:
         """The options of a row's pair."""

@@ -167,8 +167,7 @@ class _Scorer:
         comparison, result = answer.comparison, answer.comparison.result
         return replace(
             pair,
-            scores=comparison.scores,
-            stderr=comparison.stderr,
+            readings=comparison,
             patches=len(result.patches),
             samples=len(result.samples.positions),
             space=answer.alignment.label,
@@ -184,7 +183,9 @@ class _Scorer:
         surfaces, result = (answer.reference, answer.comparison.distorted), answer.comparison.result
         if self._options.report:
             stem = picture_stem(row.reference, row.id, row.distorted)
-            findings["pictures"] = write_pair_pictures(self._options.report, stem, *surfaces, result)
+            findings["pictures"] = write_pair_pictures(
+                self._options.report, stem, *surfaces, result, self._options.judge
+            )
         if self._options.explain:
             findings["where"] = where(answer.reference, result)
         if answer.attribution is not None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The cheapest version of an asset whose FMQM stays at or above a target, found by bisection, in steps.
+"""The cheapest version of an asset whose score stays at or above a target, found by bisection, in steps.
 
 All versions are scored on the same samples of the same reference, so that their differences are the meshes' and not
 chance. Most are scored with few patches; the one that is chosen, and the next cheaper one, with all of them and, where
@@ -16,6 +16,7 @@ from ..metric.errors import MeshError, SettingsError
 from ..metric.settings import FAST_SCORED_PATCHES, Settings
 from ..metric.stepper import Progress, Stepper, Work, as_part
 from ..metric.surface import MeshArrays, QueryBuilder
+from .judge import Judge
 from .measurement import Measurement
 
 TOLERANCE = 0.01  # neighboring versions differ by this share of their triangles
@@ -46,13 +47,18 @@ class Step:
 
     Attributes:
         quick: with few patches, or not as the file holds it; such scores only lead to those that count.
-        fmqm: in [0, 1]; None: nothing was left that could be measured.
+        fmqm, perceived: both scores, in [0, 1]; None: nothing was left that could be measured.
     """
 
     version: Version
     triangles: int
     fmqm: float | None
+    perceived: float | None
     quick: bool
+
+    def score(self, judge: Judge) -> float | None:
+        """That of the judge."""
+        return self.fmqm if judge is Judge.FMQM else self.perceived
 
 
 @dataclass(frozen=True)
@@ -147,10 +153,10 @@ class Search:
             raise MeshError(f"it cannot be decimated to {max_triangles} triangles; allow more")
         return list(versions[last + 1 :])
 
-    def find(self, target: float, versions: Sequence[Version]) -> Work[SearchResult]:
-        """The last of versions, which get ever cheaper, that stays at or above the target; the next one does not.
+    def find(self, target: float, versions: Sequence[Version], judge: Judge = Judge.FMQM) -> Work[SearchResult]:
+        """The last of versions, which get ever cheaper, that the judge scores at or above the target; not the next one.
 
-        FMQM falls about steadily with them, not strictly: a much cheaper one that happens to pass may be missed.
+        Scores fall about steadily with them, not strictly: a much cheaper one that happens to pass may be missed.
         """
         path: list[Step] = []
 
@@ -158,7 +164,8 @@ class Search:
             step = yield from self._scored(versions[index], quick, len(path))
             if step not in path:
                 path.append(step)
-            return step.fmqm is not None and step.fmqm >= target
+            score = step.score(judge)
+            return score is not None and score >= target
 
         start, stride = len(versions) // 2, max(1, len(versions) // 4)
         if self._two_rounds:
@@ -180,16 +187,16 @@ class Search:
         if version.texture is not None:
             what += f", textures of {version.texture}"
         yield Progress(what, done)
-        triangles, fmqm = 0, None
+        triangles, fmqm, perceived = 0, None, None
         try:
             mesh = self._read[quick](version)
             triangles = len(mesh.triangles)
             comparing = self._measurements[quick].compare(mesh)
             compared = yield from as_part(comparing, done, (1 - done) * _PER_STEP, what)
-            fmqm = compared.scores.FMQM
+            fmqm, perceived = compared.scores.FMQM, compared.perceived.score
         except MeshError:
             pass  # nothing is left of it: it misses any target
-        step = Step(version, triangles, fmqm, quick)
+        step = Step(version, triangles, fmqm, perceived, quick)
         self._steps[quick, version] = step
         return step
 
@@ -221,10 +228,11 @@ class DecimationGoal:
     """What decimation is to reach.
 
     Attributes:
-        targets: FMQM that decimated versions must keep; empty: the triangles stay as they are.
+        targets: scores that decimated versions must keep; empty: the triangles stay as they are.
         max_triangles: that no version may exceed, at least LEAST_TRIANGLES; None: as many as the asset has.
-        texture_target: FMQM that each of them must still keep with smaller textures; None: these stay as they are.
+        texture_target: score that each of them must still keep with smaller textures; None: these stay as they are.
         texture_sizes: longest sides of the color images, falling, the first the present one.
+        judge: whose scores these are.
 
     Raises:
         SettingsError: max_triangles is too small.
@@ -234,6 +242,7 @@ class DecimationGoal:
     max_triangles: int | None = None
     texture_target: float | None = None
     texture_sizes: tuple[int, ...] = ()
+    judge: Judge = Judge.FMQM
 
     def __post_init__(self) -> None:
         if self.max_triangles is not None and self.max_triangles < LEAST_TRIANGLES:
@@ -295,11 +304,12 @@ def _decimating(search: Search, goal: DecimationGoal) -> Work[DecimationResult]:
         first = _PREPARED + share * parts * number / max(1, len(goal.targets))
         geometry, texture, ratio = None, None, 1.0
         if target is not None:
-            geometry = yield from as_share(search.find(target, ratios), first, share)
+            geometry = yield from as_share(search.find(target, ratios, goal.judge), first, share)
             ratio = geometry.best.version.ratio
         if goal.texture_target is not None and (geometry is None or geometry.reached):
             versions = [Version(ratio), *(Version(ratio, size) for size in goal.texture_sizes[1:])]
-            texture = yield from as_share(search.find(goal.texture_target, versions), first + share, share)
+            searching = search.find(goal.texture_target, versions, goal.judge)
+            texture = yield from as_share(searching, first + share, share)
         results.append(TargetResult(geometry, texture))
     return DecimationResult(tuple(results), search.triangles, search.warnings)
 

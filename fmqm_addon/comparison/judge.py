@@ -22,6 +22,11 @@ class Judge(StrEnum):
         return "FMQM" if self is Judge.FMQM else "perceived"
 
     @property
+    def p10_column(self) -> str:
+        """What the 10th percentile of its score over the patches is called."""
+        return "fmqm_p10" if self is Judge.FMQM else "perceived_p10"
+
+    @property
     def features(self) -> tuple[str, ...]:
         """Columns of the four features that its score is the mean of."""
         return COLUMNS[:4] if self is Judge.FMQM else PERCEIVED_COLUMNS[:4]

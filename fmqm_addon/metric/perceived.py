@@ -66,8 +66,8 @@ def perceived_of_patches(
 
 def perceived_of_pair(table: Floats) -> Perceived:
     """Means over the patches of perceived_of_patches' (P, 5) table."""
-    *features, score = table.mean(axis=0).tolist()
-    return Perceived(score, *features, low_percentile(table[:, -1]))
+    shape, facing, color, detail, score = table.mean(axis=0).tolist()
+    return Perceived(score, shape, facing, color, detail, low_percentile(table[:, -1]))
 
 
 def low_percentile(of_patches: Floats) -> float:

@@ -8,7 +8,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 from xml.etree import ElementTree
 
-from .records import SHOWN, below, shortfall
+from .criteria import below, judge_of, shortfall
+from .records import PERCEIVED, SHOWN, value_of
 
 _NOT_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
@@ -16,7 +17,8 @@ _NOT_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]
 def junit_parts(records: Iterable[Mapping[str, Any]]) -> Iterator[str]:
     """The text of a document; goes through the records twice.
 
-    A pair below its fail_under is a failure with the four features in its message; one without scores is an error.
+    A pair below a threshold is a failure with the judge's four features in its message; one without scores is an
+    error. All numbers are properties.
     """
     pairs = failures = errors = 0
     seconds = 0.0
@@ -35,10 +37,14 @@ def junit_parts(records: Iterable[Mapping[str, Any]]) -> Iterator[str]:
 def _case(record: Mapping[str, Any]) -> ElementTree.Element:
     names = {"classname": _text(record["reference"]), "name": _text(record["id"])}
     case = ElementTree.Element("testcase", names, time=f"{record['seconds']['total']:.3f}")
+    if record["error"] is None:
+        properties = ElementTree.SubElement(case, "properties")
+        for name in (*SHOWN, *PERCEIVED, "fmqm_p10"):
+            ElementTree.SubElement(properties, "property", name=name, value=repr(value_of(record, name)))
     if record["error"] is not None:
         ElementTree.SubElement(case, "error", message=_text(record["error"]))
     elif below(record):
-        features = ", ".join(f"{name} {record[name]:.4f}" for name in SHOWN[1:])
+        features = ", ".join(f"{name} {value_of(record, name):.4f}" for name in judge_of(record).features)
         ElementTree.SubElement(case, "failure", message=f"{shortfall(record)}: {features}")
     if record["warnings"]:
         ElementTree.SubElement(case, "system-out").text = _text("\n".join(record["warnings"]))

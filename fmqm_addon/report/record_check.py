@@ -9,6 +9,8 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, NoReturn
 
+from ..comparison.judge import Judge
+from ..metric.perceived import Perceived
 from .explain import explain
 from .records import RECORD_KEYS, SHOWN, STAGES
 from .trust_table import GROUPS, trust_lines
@@ -60,6 +62,8 @@ def record_fault(record: object) -> str:
             return f"{name} is not what it should be"
     if (record["error"] is None) != _is_scores(record):
         return "it has neither five scores nor an error"
+    if (record["error"] is None) != (_is_perceived(record["perceived"]) and _is_share(record["fmqm_p10"])):
+        return "perceived or fmqm_p10 is not what it should be"
     try:
         explain(record)
     except _CANNOT_BE_SHOWN:
@@ -92,6 +96,24 @@ def _is_scores(value: object) -> bool:
     return isinstance(value, Mapping) and all(_is_share(value.get(name)) for name in SHOWN)
 
 
+def _is_perceived(value: object) -> bool:
+    return (
+        isinstance(value, Mapping)
+        and all(_is_share(value.get(name)) for name in Perceived._fields)
+        and "stderr" in value
+        and _is_errors(value["stderr"], Perceived._fields)
+    )
+
+
+def _is_reverse(value: object) -> bool:
+    return isinstance(value, Mapping) and _is_scores(value) and _is_perceived(value.get("perceived"))
+
+
+def _is_no_perceived(value: object) -> bool:
+    """Whether it is that of a pair without scores."""
+    return value == dict.fromkeys((*Perceived._fields, "stderr"))
+
+
 def _is_list(value: object, is_right: Any, length: int | None = None) -> bool:
     return (
         isinstance(value, Sequence)
@@ -101,8 +123,8 @@ def _is_list(value: object, is_right: Any, length: int | None = None) -> bool:
     )
 
 
-def _is_errors(value: object) -> bool:
-    return value is None or (isinstance(value, Mapping) and all(_is_amount(value.get(name)) for name in SHOWN))
+def _is_errors(value: object, names: Sequence[str] = SHOWN) -> bool:
+    return value is None or (isinstance(value, Mapping) and all(_is_amount(value.get(name)) for name in names))
 
 
 def _is_amount(value: object) -> bool:
@@ -124,7 +146,7 @@ def _is_worst(value: object) -> bool:
     return (
         isinstance(value, Mapping)
         and all(_is_picture(value.get(name)) for name in ("reference", "distorted"))
-        and all(_is_share(value.get(name)) for name in ("FMQM", "value"))
+        and all(_is_share(value.get(name)) for name in ("FMQM", "perceived", "value"))
         and _is_text(value.get("blame"))
         and (value.get("at") is None or _is_list(value["at"], _is_number, 2))
     )
@@ -135,6 +157,7 @@ def _is_pictures(value: object) -> bool:
         isinstance(value, Mapping)
         and all(_is_picture(value.get(name)) for name in ("reference", "distorted", "heat"))
         and all(_is_list(value.get(name), _is_count, 2) for name in ("size", "triangles", "texture_bytes"))
+        and value.get("judge") in tuple(Judge)
         and isinstance(value.get("has_gaps"), bool)
         and _is_list(value.get("worst"), _is_worst)
     )
@@ -169,11 +192,13 @@ _KINDS: dict[str, Any] = {
     **dict.fromkeys(SHOWN, lambda value: value is None or _is_share(value)),
     **dict.fromkeys(("patches", "samples"), lambda value: value is None or _is_count(value)),
     "stderr": _is_errors,
-    "reverse": lambda value: value is None or _is_scores(value),
+    "perceived": lambda value: _is_perceived(value) or _is_no_perceived(value),
+    "reverse": lambda value: value is None or _is_reverse(value),
+    "judge": lambda value: value in tuple(Judge),
     "seconds": lambda value: isinstance(value, dict) and all(_is_amount(value.get(stage)) for stage in STAGES),
     "warnings": lambda value: _is_list(value, _is_text),
     "settings": is_settings,
-    "fail_under": lambda value: value is None or _is_share(value),
+    **dict.fromkeys(("fmqm_p10", "fail_under", "fail_under_p10"), lambda value: value is None or _is_share(value)),
     "pictures": _is_pictures,
     "attribution": lambda value: value is None or is_attribution(value),
     "trust": lambda value: value is None or is_trust(value),

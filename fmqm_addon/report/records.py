@@ -11,11 +11,16 @@ from dataclasses import dataclass, field
 from itertools import chain
 from typing import Any
 
+from ..comparison.measurement import Readings
 from ..metric.errors import one_line
 from ..metric.evaluation import COLUMNS, Scores
+from ..metric.perceived import Perceived
 from .trust_table import Report, trust_text
 
 SHOWN = ("FMQM", *(name for name in COLUMNS if name != "FMQM"))  # the score first, then its features
+# Columns of the second reading, and what they are called in a record's "perceived".
+PERCEIVED = {"perceived": "score", **{name: name for name in Perceived._fields[1:-1]}, "perceived_p10": "p10"}
+TABLE = (*SHOWN, "perceived")
 STAGES = ("load", "prepare", "fields", "features", "total")
 REVERSE = "reverse "  # before the names of the other direction's columns
 _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "\uff1d", "\uff0b", "\uff0d", "\uff20")  # the last are wide ones
@@ -29,26 +34,25 @@ class PairScore:
 
     Attributes:
         reference, distorted: as the user named them.
-        scores, stderr: None where there are none.
+        readings: None where there are none.
         seconds: by STAGES; what several pairs share is counted in the first.
         error: why there are no scores.
         space: where the two were compared, as comparison.alignment.Alignment.label has it.
-        reverse: scores of the other direction, the distorted mesh as the reference; None: not asked for.
+        reverse: readings of the other direction, the distorted mesh as the reference; None: not asked for.
         trust: as report.trust_table.trust_dict has it.
         findings: what else was asked for, by its key in the record: where, attribution, pictures.
     """
 
     reference: str
     distorted: str
-    scores: Scores | None = None
-    stderr: Scores | None = None
+    readings: Readings | None = None
     patches: int | None = None
     samples: int | None = None
     seconds: dict[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     error: str | None = None
     space: str | None = None
-    reverse: Scores | None = None
+    reverse: Readings | None = None
     trust: Report | None = None
     findings: dict[str, Any] = field(default_factory=dict)
 
@@ -95,13 +99,13 @@ def csv_parts(records: Iterable[Mapping[str, Any]], raw: bool = False) -> Iterat
     Args:
         raw: texts as they are. Else one that a spreadsheet would take for a formula comes after a single quote.
     """
-    names = ("id", "reference", "distorted", *SHOWN, "error")
-    turned = SHOWN if _any_reverse(records) else ()
-    yield _csv_line((*names, *(f"{REVERSE}{name}" for name in turned)))
+    names, numbers = ("id", "reference", "distorted"), (*SHOWN, *PERCEIVED)
+    turned = numbers if _any_reverse(records) else ()
+    yield _csv_line((*names, *numbers, "error", *(f"{REVERSE}{name}" for name in turned)))
     for record in records:
-        reverse = record["reverse"] or dict.fromkeys(SHOWN)
-        values = [record[name] for name in names] + [reverse[name] for name in turned]
-        yield _csv_line(values, raw)
+        values = [record[name] for name in names] + [value_of(record, name) for name in numbers] + [record["error"]]
+        reverse = record["reverse"] or _UNREAD
+        yield _csv_line(values + [value_of(reverse, name) for name in turned], raw)
 
 
 def table_parts(records: Iterable[Mapping[str, Any]]) -> Iterator[str]:
@@ -110,7 +114,7 @@ def table_parts(records: Iterable[Mapping[str, Any]]) -> Iterator[str]:
     The other direction's FMQM is the last column, where it was measured.
     """
     both = _any_reverse(records)
-    header = ("id", *SHOWN, *([f"{REVERSE}FMQM"] if both else []))
+    header = ("id", *TABLE, *([f"{REVERSE}FMQM"] if both else []))
     widths = [len(name) for name in header]
     for record in records:
         widths = [max(width, len(cell)) for width, cell in zip(widths, _cells(record, both), strict=True)]
@@ -133,31 +137,36 @@ def pair_record(pair: PairScore) -> dict[str, Any]:
         "id": pair.distorted,
         "reference": pair.reference,
         "distorted": pair.distorted,
-        **_columns(pair.scores),
-        "stderr": None if pair.stderr is None else _columns(pair.stderr),
+        **(_UNREAD if pair.readings is None else _read(pair.readings)),
+        "stderr": None if pair.readings is None or pair.readings.stderr is None else _columns(pair.readings.stderr),
+        "fmqm_p10": None if pair.readings is None else pair.readings.fmqm_p10,
         "patches": pair.patches,
         "samples": pair.samples,
         "space": pair.space,
         "seconds": {stage: pair.seconds.get(stage, 0.0) for stage in STAGES},
         "warnings": list(pair.warnings),
         "error": pair.error,
-        "reverse": None if pair.reverse is None else _columns(pair.reverse),
+        "reverse": None if pair.reverse is None else _read(pair.reverse),
         "trust": pair.trust,
         **pair.findings,
     }
 
 
-def below(record: Mapping[str, Any]) -> bool:
-    """Whether a scored pair misses its threshold."""
-    return record["FMQM"] is not None and record["FMQM"] < (record["fail_under"] or 0)
+def value_of(record: Mapping[str, Any], column: str) -> float | None:
+    """A number of a record, or of its other direction: one of SHOWN, of PERCEIVED, or fmqm_p10; None: no scores."""
+    found: float | None = record["perceived"][PERCEIVED[column]] if column in PERCEIVED else record[column]
+    return found
 
 
-def shortfall(record: Mapping[str, Any]) -> str:
-    """By how much a pair that is below its threshold misses it; with so many digits that it shows."""
-    shown = f"{record['FMQM']:.4f}"
-    if float(shown) >= record["fail_under"]:
-        shown = repr(record["FMQM"])
-    return f"FMQM {shown} is below {record['fail_under']:g}"
+def score_text(record: Mapping[str, Any], column: str, missing: str, plus_minus: str) -> str:
+    """A number of a record as people read it, with its standard error where that is known."""
+    value = value_of(record, column)
+    if value is None:
+        return missing
+    stderr, name = record["stderr"], column
+    if column in PERCEIVED:
+        stderr, name = record["perceived"]["stderr"], PERCEIVED[column]
+    return f"{value:.4f}" if stderr is None else f"{value:.4f}{plus_minus}{stderr[name]:.4f}"
 
 
 def _any_reverse(records: Iterable[Mapping[str, Any]]) -> bool:
@@ -167,11 +176,7 @@ def _any_reverse(records: Iterable[Mapping[str, Any]]) -> bool:
 def _cells(record: Mapping[str, Any], both: bool) -> tuple[str, ...]:
     reverse = record["reverse"]
     turned = [f"{reverse['FMQM']:.4f}" if reverse else "-"] if both else []
-    if record["FMQM"] is None:
-        return (one_line(record["id"]), *["-"] * len(SHOWN), *turned)
-    stderr = record["stderr"]
-    spread = {name: f" ±{stderr[name]:.4f}" if stderr else "" for name in SHOWN}
-    return (one_line(record["id"]), *(f"{record[name]:.4f}{spread[name]}" for name in SHOWN), *turned)
+    return (one_line(record["id"]), *(score_text(record, name, "-", " ±") for name in TABLE), *turned)
 
 
 def _csv_line(values: Iterable[str | float | None], raw: bool = False) -> str:
@@ -187,10 +192,19 @@ def _csv_cell(value: str | float | None, raw: bool) -> str:
     return '"' + text.replace('"', '""') + '"' if is_formula or _QUOTED.search(text) else text
 
 
-def _columns(values: Scores | None) -> dict[str, float | None]:
-    if values is None:
-        return dict.fromkeys(SHOWN)
+def _columns(values: Scores) -> dict[str, float]:
     return {name: getattr(values, name) for name in SHOWN}
 
 
+def _read(readings: Readings) -> dict[str, Any]:
+    """The numbers of both readings."""
+    stderr = readings.perceived_stderr
+    perceived = {**readings.perceived._asdict(), "stderr": None if stderr is None else stderr._asdict()}
+    return {**_columns(readings.scores), "perceived": perceived}
+
+
+_UNREAD: dict[str, Any] = {
+    **dict.fromkeys(SHOWN),
+    "perceived": dict.fromkeys((*Perceived._fields, "stderr")),
+}  # of a pair without scores
 RECORD_KEYS = frozenset(pair_record(PairScore("", "")))  # what each record has

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..metric.errors import FMQMError
-from ..metric.evaluation import COLUMNS, Result
+from ..metric.evaluation import Result
 from ..metric.geometry import Floats, Ints, closest_on_triangles, dot
 from ..metric.surface import Surface, triangle_normals
 from .visual.axes import plane_axes
@@ -228,11 +228,11 @@ def score_by_face(result: Result, surface: Surface, column: str = "FMQM") -> Flo
     A triangle that was cut for the patches has the area-weighted mean of its covered pieces.
 
     Args:
-        surface: the reference of the result. column: one of COLUMNS.
+        surface: the reference of the result. column: as in Result.of_patches.
     """
     mesh = result.patch_mesh
     total, patches = np.zeros(len(mesh.triangles)), np.zeros(len(mesh.triangles))
-    for patch, score in zip(result.patches, result.patch_scores[:, COLUMNS.index(column)].tolist(), strict=True):
+    for patch, score in zip(result.patches, result.of_patches(column).tolist(), strict=True):
         total[patch.faces] += score
         patches[patch.faces] += 1
     covered = patches > 0

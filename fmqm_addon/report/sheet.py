@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..metric.evaluation import COLUMNS, Result
+from ..comparison.judge import Judge
+from ..metric.evaluation import Result
 from ..metric.geometry import Floats
 from ..metric.surface import Surface
 from .atomic_files import replaced
@@ -27,8 +28,15 @@ WIDTH = 1500  # pixels; the lengths and type sizes below are for a picture this 
 GAP, BAR_WIDTH, BAR_SPACE, HEAD, FOOT = 24, 22, 86, 64, 60
 
 
-def write_picture(path: str, reference: Surface, distorted: Surface, result: Result, width: int = WIDTH) -> None:
-    """A PNG of the reference, the distorted surface, and the reference colored by FMQM.
+def write_picture(
+    path: str,
+    reference: Surface,
+    distorted: Surface,
+    result: Result,
+    width: int = WIDTH,
+    judge: Judge = Judge.FMQM,
+) -> None:
+    """A PNG of the reference, the distorted surface, and the reference colored by the judge's scores.
 
     The file is replaced when the new one is complete, or not at all.
 
@@ -40,10 +48,12 @@ def write_picture(path: str, reference: Surface, distorted: Surface, result: Res
     """
     require_pillow()
     with replaced(path) as temporary:
-        compose(reference, distorted, result, width).save(temporary, "PNG")
+        compose(reference, distorted, result, width, judge).save(temporary, "PNG")
 
 
-def compose(reference: Surface, distorted: Surface, result: Result, width: int = WIDTH) -> Image:
+def compose(
+    reference: Surface, distorted: Surface, result: Result, width: int = WIDTH, judge: Judge = Judge.FMQM
+) -> Image:
     """The picture of write_picture, as a Pillow image of so many pixels in width.
 
     Raises:
@@ -53,18 +63,18 @@ def compose(reference: Surface, distorted: Surface, result: Result, width: int =
     from PIL import Image, ImageDraw
 
     sheet = _Sheet(width, natural_aspect(reference, distorted))
-    faces = score_by_face(result, reference)
+    faces = score_by_face(result, reference, judge.column)
     camera = Camera.framing(reference, distorted, aspect=sheet.panel[1] / sheet.panel[0])
     canvas = Image.new("RGB", (width, sheet.height), BACKGROUND)
     for index, view in enumerate(three_views(reference, distorted, faces, camera, sheet.panel)):
         canvas.paste(Image.fromarray(view), (sheet.left(index), sheet.top))
     draw = ImageDraw.Draw(canvas)
-    score = result.scores.FMQM
-    features = [f"{name} {value:.3f}" for name, value in zip(COLUMNS[:4], result.scores[:4], strict=True)]
+    score = float(result.of_patches(judge.column).mean())
+    features = [f"{name} {result.of_patches(name).mean():.3f}" for name in judge.features]
     sheet.label(draw, 0, "Reference", reference.name, f"{len(reference.triangles):,} triangles")
     sheet.label(draw, 1, "Distorted", distorted.name, f"{len(distorted.triangles):,} triangles")
-    sheet.label(draw, 2, f"FMQM {score:.4f}", "   ".join(features[:2]), "   ".join(features[2:]))
-    sheet.color_bar(draw, score, bool(np.isnan(faces).any()))
+    sheet.label(draw, 2, f"{judge.column} {score:.4f}", "   ".join(features[:2]), "   ".join(features[2:]))
+    sheet.color_bar(draw, judge.column, score, bool(np.isnan(faces).any()))
     return canvas
 
 
@@ -94,7 +104,7 @@ class _Sheet:
             y = self.top + self.panel[1] + self._px(14 + 24 * number)
             self._text(draw, (center, y), line, 17, FAINT_INK, "mm")
 
-    def color_bar(self, draw: ImageDraw, score: float, has_gaps: bool) -> None:
+    def color_bar(self, draw: ImageDraw, column: str, score: float, has_gaps: bool) -> None:
         """Scores and their colors, 1 at the top, with a mark at the whole score."""
         px = self._px
         left, right = self.left(3), self.left(3) + px(BAR_WIDTH)
@@ -108,7 +118,7 @@ class _Sheet:
             self._text(draw, (right + px(13), y), f"{tenth / 10:.1f}", 16, INK, "lm")
         y = round(bottom - (bottom - top) * score)
         draw.polygon([(left - px(2), y), (left - px(11), y - px(6)), (left - px(11), y + px(6))], fill=INK)
-        self._text(draw, (left, top - px(24)), "FMQM", 16, INK, "lm")
+        self._text(draw, (left, top - px(24)), column, 16, INK, "lm")
         if has_gaps:
             y = bottom + px(24)
             draw.rectangle([left, y - px(6), left + px(12), y + px(6)], fill=_to_bytes(np.array(NO_PATCH)))

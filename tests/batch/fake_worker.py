@@ -15,7 +15,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from fmqm_addon.batch.journal import Journal
 from fmqm_addon.batch.rows import task_of
 from fmqm_addon.batch.workers import end_with_parent, journal_of
-from fmqm_addon.report.records import SHOWN, PairScore, pair_record
+from fmqm_addon.report.records import PairScore, pair_record
+from tests.readings import numbers
 
 shard = Path(sys.argv[-1])
 end_with_parent()
@@ -44,5 +45,5 @@ for task in (task_of(plain) for plain in json.loads(shard.read_text(encoding="ut
         swollen = bytearray(300_000_000)
         swollen[::4096] = b"x" * len(swollen[::4096])
         time.sleep(60)
-    scores = dict.fromkeys(SHOWN, 0.5) | {"id": task.row.id, "pid": os.getpid()}
+    scores = numbers(0.5) | {"id": task.row.id, "pid": os.getpid()}
     journal.done(task.key, pair_record(PairScore("reference", name, patches=200)) | scores)

@@ -23,8 +23,9 @@ from fmqm_addon.batch.journal import Journal, line_of
 from fmqm_addon.batch.progress_log import Log
 from fmqm_addon.batch.rows import Row, Task
 from fmqm_addon.provenance import code_digest, provenance
-from fmqm_addon.report.records import SHOWN, PairScore, pair_record
+from fmqm_addon.report.records import PairScore, pair_record
 from tests.blender.script import SCORE, noise, read_json, score, without_seconds, write_png, write_torus
+from tests.readings import numbers
 
 TINY = ("--samples", "640", "--patches", "20", "--color-units", "5")
 NAMES = [f"shaken{number}.obj" for number in range(16)]
@@ -143,7 +144,7 @@ def wait_for(address: str, count: int) -> None:
 
 def test_what_comes_back_by_other_code_is_an_error() -> None:
     """Should a worker's checkout change while it scores."""
-    pair = pair_record(PairScore("r", "d", patches=200)) | dict.fromkeys(SHOWN, 0.5)
+    pair = pair_record(PairScore("r", "d", patches=200)) | numbers(0.5)
     lines = line_of({"done": "k", "made_by": {"fmqm_code": "other"}, "pair": pair})
     future = SimpleNamespace(status="finished", result=lambda: SimpleNamespace(stdout=lines))
     journal = Journal(made_by={"fmqm_code": "ours"})

@@ -15,11 +15,14 @@ import pytest
 
 from fmqm_addon.batch.journal import Journal, Records, line_of, own_record, parse_line, row_key
 from fmqm_addon.batch.rows import BatchOptions, Row
+from fmqm_addon.comparison.judge import Judge
 from fmqm_addon.comparison.pair import PairOptions
 from fmqm_addon.metric.errors import FileError, SettingsError
 from fmqm_addon.metric.settings import Settings
+from fmqm_addon.report.criteria import Criteria
 from fmqm_addon.report.record_check import record_fault
-from fmqm_addon.report.records import SHOWN, PairScore, pair_record
+from fmqm_addon.report.records import PairScore, pair_record
+from tests.readings import numbers
 
 VERSIONS = {"fmqm_version": "1", "blender_version": "5"}
 OPTIONS = BatchOptions(pair=PairOptions(settings=Settings()))
@@ -27,7 +30,7 @@ OPTIONS = BatchOptions(pair=PairOptions(settings=Settings()))
 
 def record(name: str, score: float | None = 0.5) -> dict[str, Any]:
     pair = PairScore("r", name, patches=200, error=None if score else "broken")
-    return pair_record(pair) | dict.fromkeys(SHOWN, score)
+    return pair_record(pair) | numbers(score)
 
 
 def test_resuming_finds_what_was_done_and_replacing_does_not(tmp_path: Path) -> None:
@@ -179,11 +182,12 @@ def test_records_come_in_the_rows_order_with_their_names_and_thresholds() -> Non
     journal.done("k2", record("x"))
     journal.done("k1", record("x"))
     rows = [Row("one", "r", "x", fail_under=0.25), Row("two", "r", "x", settings=(("radius", float("inf")),))]
-    records = Records(rows, ["k1", "k2"], journal, 0.75)
+    records = Records(rows, ["k1", "k2"], journal, Criteria(Judge.PERCEIVED, 0.75))
     assert [(r["id"], r["fail_under"], r["settings"]) for r in records] == [
         ("one", 0.25, {}),
         ("two", 0.75, {"radius": "inf"}),
     ]
+    assert {r["judge"] for r in records} == {"perceived"}
     assert list(records) == list(records)
 
 

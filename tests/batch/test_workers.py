@@ -28,7 +28,8 @@ from fmqm_addon.batch.workers import (
     workers_command,
 )
 from fmqm_addon.metric.errors import FileError, FMQMError
-from fmqm_addon.report.records import SHOWN, PairScore, pair_record
+from fmqm_addon.report.records import PairScore, pair_record
+from tests.readings import numbers
 
 FAKE = Path(__file__).parent / "fake_worker.py"
 ROOT = Path(__file__).resolve().parents[2]
@@ -40,7 +41,7 @@ def tasks_of(*names: str) -> list[Task]:
 
 def record(name: str, score: float | None) -> dict[str, Any]:
     pair = PairScore("r", name, patches=200, error=None if score else "broken")
-    return pair_record(pair) | dict.fromkeys(SHOWN, score)
+    return pair_record(pair) | numbers(score)
 
 
 def watch(folder: Path, tasks: list[Task], jobs: int = 2, limits: Limits | None = None, told: str = "") -> Journal:

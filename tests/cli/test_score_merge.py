@@ -13,17 +13,17 @@ from typing import Any
 import pytest
 
 from fmqm_addon.cli.score import main
+from fmqm_addon.report.criteria import ANYTHING
 from fmqm_addon.report.records import PairScore, pair_record
+from tests.readings import all_alike
 
 HEAD = {"fmqm_version": "1", "fmqm_code": "c", "blender_version": "4", "settings": {}}
 
 
 def write_part(folder: Path, *names: str, **more: Any) -> str:
     """A part in which all scores are 0.5."""
-    scores = dict.fromkeys(("FMQM", "geoSSIM", "geoGraSSIM", "colorSSIM", "colorGraSSIM"), 0.5)
-    records = [
-        pair_record(PairScore("r", name, patches=200)) | scores | {"settings": {}, "fail_under": None} for name in names
-    ]
+    told = {"settings": {}, **ANYTHING.told()}
+    records = [pair_record(PairScore("r", name, all_alike(0.5), patches=200)) | told for name in names]
     (folder / "part.json").write_text(json.dumps(HEAD | {"pairs": [record | more for record in records]}))
     return str(folder / "part.json")
 

@@ -81,7 +81,7 @@ def same_bits(one: Result, other: Result) -> bool:
 
 
 def check_range(result: Result) -> None:
-    for table in (np.array(result.scores), result.patch_scores, result.perceived, result.patch_perceived):
+    for table in (np.array(result.scores), result.patch_scores, np.array(result.perceived), result.patch_perceived):
         assert np.isfinite(table).all()
         assert (table >= 0).all()
         assert (table <= 1).all()
@@ -111,7 +111,7 @@ VARIANTS: list[dict[str, Any]] = [
 def test_itself_is_exactly_1_under_every_option(name: str, variant: dict[str, Any]) -> None:
     mesh = textured(name)
     result = evaluate(mesh, mesh, replace(SMALL, **variant))
-    assert list(result.scores) == result.perceived.tolist() == [1.0] * 5
+    assert [*result.scores, *result.perceived, result.fmqm_p10] == [1.0] * 12
     assert (result.patch_scores == 1.0).all() and (result.patch_perceived == 1.0).all()
 
 
@@ -121,7 +121,7 @@ def test_itself_is_exactly_1_for_every_shape(name: str, scale: float) -> None:
     """Open, closed, loose, one triangle, slivers; fewer vertices than patches; in any unit."""
     mesh = moved(textured(name), scale, np.array([3.0, -2.0, 1.0]) * scale)
     result = evaluate(mesh, mesh, Settings(samples=640, patches=20, color_units=10))
-    assert list(result.scores) == result.perceived.tolist() == [1.0] * 5
+    assert [*result.scores, *result.perceived, result.fmqm_p10] == [1.0] * 12
     assert len(result.patches) <= 20
 
 

@@ -23,12 +23,14 @@ from fmqm_addon.metric.errors import FileError, FMQMError
 from fmqm_addon.metric.surface import MeshArrays, Surface, prepare_surface
 from fmqm_addon.metric.texture import Material, PlainColor, Texture
 from fmqm_addon.report import render as rendering
+from fmqm_addon.report.criteria import ANYTHING
 from fmqm_addon.report.html import pictures as pair_pictures
 from fmqm_addon.report.html.chain_curve import Level, curve_svg
 from fmqm_addon.report.html.page import page_parts, write_page
 from fmqm_addon.report.html.pictures import open_report_folder, picture_stem, texture_bytes, write_pair_pictures
 from fmqm_addon.report.render import Camera, is_seen, render
 from tests.blender.script import COLUMNS, SMALL, noise, score, write_png, write_torus
+from tests.readings import numbers
 
 from .test_render import FEW, RED, compared, hue
 
@@ -40,12 +42,9 @@ SVG = "{http://www.w3.org/2000/svg}"
 
 def record(distorted: str = "lod.glb", score: float | None = 0.5, **others: Any) -> dict[str, Any]:
     """A pair as JSON has it."""
-    scores = dict.fromkeys(COLUMNS, score)
-    pair = {"id": distorted, "reference": "ref.glb", "distorted": distorted, **scores, "stderr": None}
+    pair = {"id": distorted, "reference": "ref.glb", "distorted": distorted, **numbers(score), "stderr": None}
     return (
-        pair
-        | {"fail_under": None, "warnings": [], "error": None if score is not None else "it cannot be read"}
-        | others
+        pair | {**ANYTHING.told(), "warnings": [], "error": None if score is not None else "it cannot be read"} | others
     )
 
 
@@ -53,7 +52,7 @@ def costs(triangles: int, texture_bytes: int) -> dict[str, Any]:
     """What pictures say of a pair, without close-ups."""
     names = {name: f"pictures/{name}.jpg" for name in ("reference", "distorted", "heat")}
     pair = {"triangles": [1000, triangles], "texture_bytes": [1 << 22, texture_bytes]}
-    return names | pair | {"size": [40, 30], "has_gaps": False, "worst": []}
+    return names | pair | {"size": [40, 30], "judge": "fmqm", "has_gaps": False, "worst": []}
 
 
 class Page(HTMLParser):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""FMQM against the cost of an asset's levels, as a drawing (SVG) that takes its colors from the page."""
+"""Scores against the cost of an asset's levels, as a drawing (SVG) that takes its colors from the page."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ class Level:
     is_reference: bool = False
 
 
-def curve_svg(levels: Sequence[Level], cost: str) -> str:
+def curve_svg(levels: Sequence[Level], cost: str, of: str) -> str:
     """Scores over costs, the costs on a logarithmic axis; each level is marked and named.
 
     Args:
-        levels: at least one. cost: what it is, with its unit.
+        levels: at least one. cost: what it is, with its unit. of: what the score is called.
     """
     ordered = sorted(levels, key=lambda level: (level.cost, level.score))
     low, high = math.log(ordered[0].cost), math.log(ordered[-1].cost)
@@ -50,9 +50,9 @@ def curve_svg(levels: Sequence[Level], cost: str) -> str:
     def y(score: float) -> float:
         return HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * (score - floor) / (1 - floor)
 
-    said = "; ".join(f"{level.name}: {_short(level.cost)} {cost}, FMQM {level.score:.4f}" for level in ordered)
+    said = "; ".join(f"{level.name}: {_short(level.cost)} {cost}, {of} {level.score:.4f}" for level in ordered)
     parts = [
-        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="FMQM against {escape(cost)}. {escape(said)}">'
+        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{of} against {escape(cost)}. {escape(said)}">'
     ]
     for k in range(round((1 - floor) / step) + 1):
         score = 1 - k * step

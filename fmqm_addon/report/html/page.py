@@ -14,20 +14,16 @@ from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote
 
-import numpy as np
-
-from ...metric.geometry import Floats
+from ...comparison.judge import Judge
 from ..atomic_files import write_parts
-from ..records import SHOWN, below
-from ..trust_table import Report, trust_lines
-from ..visual.colormap import NO_PATCH, score_colors
+from ..criteria import judge_of, shortfall
+from ..records import TABLE, value_of
 from .chain_curve import Level, curve_svg
+from .fragments import MEGABYTE, MISSING, bar, score, text
+from .pair_card import pair_card
 
 PAGE = "index.html"
-MEGABYTE = 2**20
-MISSING = "–"
 # Only what lies beside the page is loaded, and only its own script runs, whatever a name might hold.
 POLICY = """default-src 'none'; base-uri 'none'; form-action 'none'; img-src 'self' file: data:;
 style-src 'unsafe-inline'; script-src 'sha256-{}'"""
@@ -36,7 +32,7 @@ _TABLE = (
     '<section class="card scroll" tabindex="0" role="region" aria-label="All pairs"><table class="scores"><thead><tr>'
     + "".join(
         f'<th scope="col"><button type="button">{name}</button></th>'
-        for name in ("Pair", *SHOWN, "Triangles", "Texture MB")
+        for name in ("Pair", *TABLE, "Triangles", "Texture MB")
     )
     + "</tr></thead><tbody>"
 )
@@ -94,8 +90,9 @@ def page_parts(records: Iterable[Record], settings: Mapping[str, Any], versions:
     for number, record in enumerate(records, 1):
         if record["reference"] != reference:
             reference = record["reference"]
-            yield f"<h2>{_text(reference)}</h2>\n{_curves(reference, overview.chains.pop(reference, []))}"
-        yield _pair(number, record, folder)
+            chain = overview.chains.pop(reference, [])
+            yield f"<h2>{text(reference)}</h2>\n{_curves(reference, chain, overview.judge)}"
+        yield pair_card(number, record, _name(record, folder))
     yield f"""{_settings(settings, versions)}
 </main>
 <script>{script}</script>
@@ -119,9 +116,11 @@ class _Overview:
     """What is known of all pairs together.
 
     Attributes:
-        pairs: how many. scored: of these. lowest: score and name. chains: the scored pairs of each reference.
+        judge: of the first pair; scores are its. pairs: how many. scored: of these. lowest: score and name.
+        chains: the scored pairs of each reference.
     """
 
+    judge: Judge = Judge.FMQM
     pairs: int = 0
     scored: int = 0
     lowest: tuple[float, str] = (1.0, "")
@@ -132,39 +131,43 @@ def _overview(records: Iterable[Record], folder: str | None) -> _Overview:
     all_pairs = _Overview()
     for record in records:
         chain = all_pairs.chains.setdefault(record["reference"], [])
+        if not all_pairs.pairs:
+            all_pairs.judge = judge_of(record)
         all_pairs.pairs += 1
-        score, name = record["FMQM"], _name(record, folder)
-        if score is None:
+        value, name = value_of(record, all_pairs.judge.column), _name(record, folder)
+        if value is None:
             continue
         all_pairs.scored += 1
-        if score < all_pairs.lowest[0]:
-            all_pairs.lowest = (score, name)
+        if value < all_pairs.lowest[0]:
+            all_pairs.lowest = (value, name)
         pictures = record.get("pictures")
         if pictures:
             own, size = (count / MEGABYTE for count in pictures["texture_bytes"])
-            chain.append(_Cost(name, score, tuple(pictures["triangles"]), (own, size)))
+            chain.append(_Cost(name, value, tuple(pictures["triangles"]), (own, size)))
     return all_pairs
 
 
 def _summary(overview: _Overview) -> str:
     said = f"{_count(overview.pairs, 'pair')}, {_count(len(overview.chains), 'reference')}."
-    score, name = overview.lowest
+    lowest, name = overview.lowest
     if name:
-        said += f" Lowest FMQM: {score:.4f}, {_text(name)}."
+        said += f" Lowest {overview.judge.column}: {lowest:.4f}, {text(name)}."
     if overview.scored < overview.pairs:
         said += f' <strong class="bad">{overview.pairs - overview.scored} not scored.</strong>'
     return said + " 1 is the same as the reference; compare scores only at equal settings."
 
 
 def _row(number: int, record: Record, folder: str | None) -> str:
-    note = f'<span class="faint">of {_text(_base_name(record["reference"]))}</span>'
+    note = f'<span class="faint">of {text(_base_name(record["reference"]))}</span>'
     if record["error"]:
         note = '<span class="bad">not scored</span>'
-    elif below(record):
-        note = f'<span class="bad">below {record["fail_under"]:g}</span>'
+    elif missed := shortfall(record):
+        note = f'<span class="bad">{missed}</span>'
     name = _name(record, folder)
-    cells = [f'<th scope="row" data-value="{escape(name)}"><a href="#pair-{number}">{_text(name)}</a><br>{note}</th>']
-    cells += [_cell(record[column], _score(record, column) + _bar(record[column])) for column in SHOWN]
+    cells = [f'<th scope="row" data-value="{escape(name)}"><a href="#pair-{number}">{text(name)}</a><br>{note}</th>']
+    cells += [
+        _cell(value_of(record, column), score(record, column) + bar(value_of(record, column))) for column in TABLE
+    ]
     pictures = record.get("pictures")
     triangles, size = (pictures["triangles"][1], pictures["texture_bytes"][1]) if pictures else (None, None)
     cells.append(_cell(triangles, MISSING if triangles is None else f"{triangles:,}"))
@@ -177,33 +180,17 @@ def _cell(value: float | None, shown: str) -> str:
     return f'<td class="number" data-value="{"" if value is None else escape(str(value))}">{shown}</td>'
 
 
-def _score(record: Record, column: str) -> str:
-    value = record[column]
-    if value is None:
-        return MISSING
-    stderr = record["stderr"]
-    return f"{value:.4f}" if stderr is None else f"{value:.4f} ± {stderr[column]:.4f}"
-
-
-def _bar(value: float | None) -> str:
-    """Its length and its color say the value, which stands beside it as text."""
-    if value is None:
-        return ""
-    color = _css(score_colors(np.array([value]))[0])
-    return f'<span class="bar"><span style="width:{100 * value:.1f}%;background:{color}"></span></span>'
-
-
-def _curves(reference: str, chain: Sequence[_Cost]) -> str:
-    """FMQM over triangles and over texture memory, where several were compared with one reference."""
+def _curves(reference: str, chain: Sequence[_Cost], judge: Judge) -> str:
+    """The judge's score over triangles and over texture memory, where several were compared with one reference."""
     if len(chain) < 2:
         return ""
     name = _base_name(reference)
-    triangles = _curve(name, chain, [each.triangles for each in chain], "triangles")
-    texture = _curve(name, chain, [each.texture_mb for each in chain], "texture MB")
+    triangles = _curve(name, chain, [each.triangles for each in chain], "triangles", judge)
+    texture = _curve(name, chain, [each.texture_mb for each in chain], "texture MB", judge)
     return f'<div class="card curves">{triangles}{texture}</div>\n'
 
 
-def _curve(reference: str, chain: Sequence[_Cost], costs: Sequence[tuple[float, float]], of: str) -> str:
+def _curve(reference: str, chain: Sequence[_Cost], costs: Sequence[tuple[float, float]], of: str, judge: Judge) -> str:
     """The costs are those of reference and distorted, for each pair of the chain."""
     own = costs[0][0]
     different = {own, *(cost for _, cost in costs)}
@@ -213,120 +200,8 @@ def _curve(reference: str, chain: Sequence[_Cost], costs: Sequence[tuple[float, 
         drawn = f'<p class="note">Not every level has a texture: there is no curve against {of}.</p>'
     else:
         levels = [Level(each.name, cost, each.score) for each, (_, cost) in zip(chain, costs, strict=True)]
-        drawn = curve_svg([Level(reference, own, 1.0, is_reference=True), *levels], of)
-    return f"<div><h4>FMQM against {of}</h4>{drawn}</div>"
-
-
-def _pair(number: int, record: Record, folder: str | None) -> str:
-    name, path = _name(record, folder), record["distorted"]
-    whole_path = "" if name == path else f'<p class="faint">{_text(path)}</p>'
-    parts = [
-        f'<div class="title"><div><h3>{_text(name)}</h3>{whole_path}</div>'
-        f'<p class="score"><span class="faint">FMQM</span> {_score(record, "FMQM")}</p></div>',
-        f'<p class="bad">Below its threshold, {record["fail_under"]:g}.</p>' if below(record) else "",
-    ]
-    if record["error"]:
-        parts.append(f'<p class="bad">Not scored: {_text(record["error"])}</p>')
-    if record.get("explanation") and not record["error"]:
-        parts.append(f'<p class="words">{_text(record["explanation"])}</p>')
-    if record["warnings"]:
-        items = "".join(f"<li>{_text(warning)}</li>" for warning in record["warnings"])
-        parts.append(f'<ul class="warnings" aria-label="Warnings">{items}</ul>')
-    if pictures := record.get("pictures"):
-        parts.append(_views(name, pictures))
-    if record["FMQM"] is not None:
-        features = "".join(
-            f'<dt>{name}</dt><dd>{_bar(record[name])}</dd><dd class="number">{_score(record, name)}</dd>'
-            for name in SHOWN
-            if name != "FMQM"
-        )
-        close_ups = _close_ups(pictures["worst"]) if pictures else ""
-        parts.append(
-            f'<div class="panels"><div><h4>Features</h4><dl class="features">{features}</dl>'
-            f"{_attribution(record.get('attribution'))}</div>{close_ups}</div>"
-        )
-    if record.get("trust"):
-        parts.append(_trust(record["trust"]))
-    return f'<article class="card" id="pair-{number}">{"".join(parts)}</article>\n'
-
-
-def _attribution(attribution: Record | None) -> str:
-    if attribution is None:
-        return ""
-    return (
-        f'<p class="note">{escape(attribution["phrase"][:1].upper() + attribution["phrase"][1:])}: '
-        f"{attribution['geometry_loss']:.3f} of FMQM with the geometry alone distorted, "
-        f"{attribution['texture_loss']:.3f} with the texture alone.</p>"
-    )
-
-
-def _views(name: str, pictures: Record) -> str:
-    """The three pictures on one camera; the worst patches that can be seen there are marked on the last."""
-    marks = "".join(
-        f'<span class="mark" style="left:{100 * worst["at"][0]:.1f}%;top:{100 * worst["at"][1]:.1f}%">{rank}</span>'
-        for rank, worst in enumerate(pictures["worst"], 1)
-        if worst["at"] is not None
-    )
-    costs = [
-        f"{triangles:,} triangles, {size / MEGABYTE:.1f} MB of textures"
-        for triangles, size in zip(pictures["triangles"], pictures["texture_bytes"], strict=True)
-    ]
-    size = tuple(pictures["size"])
-    figures = (
-        (_image(pictures["reference"], f"Reference of {name}", size), "Reference", costs[0]),
-        (_image(pictures["distorted"], f"Distorted: {name}", size), "Distorted", costs[1]),
-        (_image(pictures["heat"], f"Reference colored by the FMQM of {name}", size) + marks, "Heat map", ""),
-    )
-    return '<div class="views">' + "".join(
-        f'<figure><div class="picture">{picture}</div><figcaption><strong>{title}</strong> {caption}'
-        f"{_legend(pictures['has_gaps']) if title == 'Heat map' else ''}</figcaption></figure>"
-        for picture, title, caption in figures
-    ) + "</div>"  # fmt: skip
-
-
-def _legend(has_gaps: bool) -> str:
-    stops = ",".join(_css(color) for color in score_colors(np.linspace(0, 1, 9)))
-    gap = f'<span class="gap" style="background:{_css(np.array(NO_PATCH))}"></span>no patch' if has_gaps else ""
-    ramp = f'<span class="ramp" style="background:linear-gradient(90deg,{stops})"></span>'
-    return f'<span class="legend">FMQM 0{ramp}1 {gap}</span>'
-
-
-def _close_ups(worst: Sequence[Record]) -> str:
-    if not worst:
-        return '<div><h4>Worst patches</h4><p class="note">None: every patch is like the reference\'s.</p></div>'
-    figures = "".join(
-        f'<figure><div class="picture two">{_image(each["reference"], f"Worst patch {rank}, reference")}'
-        f"{_image(each['distorted'], f'Worst patch {rank}, distorted')}</div>"
-        f"<figcaption><strong>{rank}</strong> FMQM {each['FMQM']:.3f}; {escape(each['blame'])} {each['value']:.3f}"
-        "</figcaption></figure>"
-        for rank, each in enumerate(worst, 1)
-    )
-    return (
-        "<div><h4>Worst patches: reference, distorted; their FMQM and what lowers it most</h4>"
-        f'<div class="close-ups">{figures}</div></div>'
-    )
-
-
-def _image(path: str, alt: str, size: tuple[int, int] | None = None) -> str:
-    sized = "" if size is None else ' width="{}" height="{}"'.format(*(escape(str(side)) for side in size))
-    return f'<img src="{escape(quote(path))}" alt="{escape(alt)}"{sized} loading="lazy">'
-
-
-def _trust(trust: Report) -> str:
-    """The facts behind a score: those of both meshes side by side, then those of the pair."""
-    rows = []
-    for line in trust_lines(trust):
-        first = f"<td>{_text(line.values[0])}</td>" if len(line.values) > 1 else ""
-        last = f"<td>{_text(line.values[-1])}</td>" if first else f'<td colspan="2">{_text(line.values[0])}</td>'
-        rows.append(
-            f'<tr><th scope="row">{_text(line.label)}</th>{first}{last}<td class="faint">{_text(line.unit)}</td></tr>'
-        )
-    return (
-        '<details><summary>How far to trust this score</summary><div class="scroll" tabindex="0" role="region" '
-        'aria-label="Trust report"><table><thead><tr><td></td><th scope="col">Reference</th>'
-        f'<th scope="col">Distorted</th><th scope="col">Unit</th></tr></thead><tbody>{"".join(rows)}</tbody></table>'
-        "</div></details>"
-    )
+        drawn = curve_svg([Level(reference, own, 1.0, is_reference=True), *levels], of, judge.column)
+    return f"<div><h4>{judge.column} against {of}</h4>{drawn}</div>"
 
 
 def _value(value: Any) -> str:
@@ -337,15 +212,15 @@ def _value(value: Any) -> str:
     if isinstance(value, int):
         return f"{value:,}"
     if isinstance(value, Mapping):
-        return "<br>".join(f"{_text(name)}: {_value(part)}" for name, part in value.items()) or "none"
+        return "<br>".join(f"{text(name)}: {_value(part)}" for name, part in value.items()) or "none"
     if isinstance(value, Sequence) and not isinstance(value, str):
         return ", ".join(_value(part) for part in value) or "none"
-    return _text("none" if value is None else value)
+    return text("none" if value is None else value)
 
 
 def _settings(settings: Mapping[str, Any], versions: Mapping[str, str]) -> str:
     rows = "".join(f"<div><dt>{_words(name)}</dt><dd>{_value(value)}</dd></div>" for name, value in settings.items())
-    made = ", ".join(f"{_words(name)} {_text(value)}" for name, value in versions.items())
+    made = ", ".join(f"{_words(name)} {text(value)}" for name, value in versions.items())
     return (
         f'<section><h2>Settings</h2><dl class="card settings">{rows}</dl><p class="note">{made}. Texture MB: '
         "the images that colors are read from, uncompressed, four bytes a pixel.</p></section>"
@@ -382,18 +257,9 @@ def _base_name(path: str) -> str:
     return Path(path).name or path
 
 
-def _text(text: object) -> str:
-    """Text from anywhere as HTML; it cannot turn the direction of what stands around it."""
-    return f"<bdi>{escape(str(text))}</bdi>"
-
-
 def _words(name: str) -> str:
     return escape(name.replace("_", " "))
 
 
 def _count(number: int, of: str) -> str:
     return f"{number:,} {of}" if number == 1 else f"{number:,} {of}s"
-
-
-def _css(color: Floats) -> str:
-    return "#" + "".join(f"{channel:02x}" for channel in np.rint(color * 255).astype(int).tolist())

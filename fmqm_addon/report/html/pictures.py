@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...comparison.judge import Judge
 from ...metric.errors import FileError, OutputError
 from ...metric.evaluation import Result
 from ...metric.surface import Surface
@@ -55,12 +56,14 @@ def open_report_folder(folder: str) -> None:
     check_writable(os.path.join(folder, "any"))
 
 
-def has_pictures(folder: str | None, record: Mapping[str, Any]) -> bool:
-    """Whether a pair needs no more pictures: there is no report, it has no scores, or they are in the folder."""
+def has_pictures(folder: str | None, record: Mapping[str, Any], judge: Judge) -> bool:
+    """Whether a pair needs no more pictures: there is no report, it has no scores, or the judge's are in the folder."""
     if not folder or record["error"] is not None:
         return True
     pictures = record.get("pictures")
-    return pictures is not None and os.path.exists(os.path.join(folder, pictures["heat"]))
+    if pictures is None or pictures["judge"] != judge:
+        return False
+    return os.path.exists(os.path.join(folder, pictures["heat"]))
 
 
 def picture_stem(*parts: str) -> str:
@@ -75,9 +78,11 @@ def picture_stem(*parts: str) -> str:
 
 
 def write_pair_pictures(
-    folder: str, stem: str, reference: Surface, distorted: Surface, result: Result
+    folder: str, stem: str, reference: Surface, distorted: Surface, result: Result, judge: Judge
 ) -> dict[str, Any]:
     """Reference, distorted surface and heat map on one camera, and the worst patches of both in close-up.
+
+    The heat map's colors and the worst patches are the judge's.
 
     Args:
         folder: of the report, made by open_report_folder. stem: by picture_stem.
@@ -92,24 +97,31 @@ def write_pair_pictures(
     width = round((VIEW_AREA / aspect) ** 0.5)
     size = (width, round(width * aspect))
     camera = Camera.framing(reference, distorted, aspect=size[1] / size[0])
-    faces = score_by_face(result, reference)
+    faces = score_by_face(result, reference, judge.column)
     views = three_views(reference, distorted, faces, camera, size)
     names = ("reference", "distorted", "heat")
     return {
         **{name: _write(folder, f"{stem}-{name}", view) for name, view in zip(names, views, strict=True)},
         "size": list(size),
         "has_gaps": bool(np.isnan(faces).any()),
-        "worst": _close_ups(folder, stem, reference, distorted, result, camera),
+        "judge": str(judge),
+        "worst": _close_ups(folder, stem, reference, distorted, result, judge, camera),
         "triangles": [surface.preparation.given for surface in (reference, distorted)],
         "texture_bytes": [texture_bytes(surface) for surface in (reference, distorted)],
     }
 
 
 def _close_ups(
-    folder: str, stem: str, reference: Surface, distorted: Surface, result: Result, overview: Camera
+    folder: str,
+    stem: str,
+    reference: Surface,
+    distorted: Surface,
+    result: Result,
+    judge: Judge,
+    overview: Camera,
 ) -> list[dict[str, Any]]:
     found = []
-    for number, worst in enumerate(worst_patches(result, CLOSE_UPS), 1):
+    for number, worst in enumerate(worst_patches(result, CLOSE_UPS, judge), 1):
         if worst.score == 1:  # nothing to see here, nor in those that follow
             break
         center, diagonal, normal = patch_view(result, worst.patch)
@@ -122,7 +134,7 @@ def _close_ups(
         found.append(
             {
                 **pictures,
-                "FMQM": worst.score,
+                **{each.column: float(result.of_patches(each.column)[worst.patch]) for each in Judge},
                 "blame": worst.blame,
                 "value": worst.value,
                 "at": overview.place_of(seed) if is_seen(reference, overview, seed) else None,

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...metric.evaluation import COLUMNS, Result
+from ...metric.evaluation import Result
 from ...metric.fields import Fields
 from ...metric.geometry import Floats, dot
 from .colormap import GREY_DARK, GREY_LIGHT, SKY, VERMILION, number_colors, score_colors, signed_colors
@@ -59,6 +59,11 @@ LAYERS: dict[str, Layer] = {
         Layer("geoGraSSIM", "Direction", SCORE, "geoGraSSIM: low where the surface faces another way"),
         Layer("colorSSIM", "Color", SCORE, "colorSSIM: low where colors changed or detail was lost"),
         Layer("colorGraSSIM", "Color Edges", SCORE, "colorGraSSIM: low where edges in the texture moved or blurred"),
+        Layer("perceived", "Perceived", SCORE, "Perceived quality of each patch: what the score is the mean of"),
+        Layer("shape", "Perceived Shape", SCORE, "shape: low where the surface moved away or lost relief"),
+        Layer("facing", "Perceived Facing", SCORE, "facing: low where the surface faces another way, and shades so"),
+        Layer("color", "Perceived Color", SCORE, "color: low where colors or their contrast changed visibly"),
+        Layer("detail", "Perceived Detail", SCORE, "detail: low where the texture is blurred, moved or broken up"),
         Layer("NCF_REFERENCE", "Color of Reference", COLOR, "NCF: the reference's color nearest to each sample"),
         Layer("NCF_COMPARED", "Color of Compared", COLOR, "NCF: the compared object's color nearest to each sample"),
         Layer(
@@ -152,7 +157,7 @@ def _values_of_patches(result: Result, name: str) -> NDArray[np.float64]:
     """(P,) a layer of the kinds SCORE and NUMBER."""
     if name == "PATCH":
         return np.arange(len(result.patches), dtype=np.float64)
-    return result.patch_scores[:, COLUMNS.index(name)]
+    return result.of_patches(name)
 
 
 def value_range(name: str, values: Floats, fitted: bool, diagonal: float) -> tuple[float, float]:
@@ -232,9 +237,9 @@ def legend(
     ticks = tuple((k / (_TICKS - 1), text(low + (high - low) * k / (_TICKS - 1))) for k in range(_TICKS))
     if layer.kind != SCORE:
         return Legend(layer.label, subtitle, bar, ticks)
-    score = result.scores[COLUMNS.index(name)]
+    score = float(result.of_patches(name).mean())
     place = min(max((score - low) / (high - low), 0.0), 1.0)
-    heading = layer.label if layer.label == name else f"{layer.label} ({name})"
+    heading = layer.label if layer.label.lower() == name.lower() else f"{layer.label} ({name})"
     return Legend(heading, subtitle, bar, ticks, (place, f"{score:.4f}"))
 
 
@@ -251,7 +256,7 @@ def blended_scores(result: Result, name: str) -> Floats:
     their centers in their own size. For the number of the patch, it is the one that weighs most.
     """
     vertices = result.patch_mesh.vertices
-    scores = None if LAYERS[name].kind == NUMBER else result.patch_scores[:, COLUMNS.index(name)].astype(np.float32)
+    scores = None if LAYERS[name].kind == NUMBER else result.of_patches(name).astype(np.float32)
     centers = result.patch_centers.astype(np.float32)
     width = np.array([patch.diagonal for patch in result.patches], np.float32) / 4
     values = np.empty(len(vertices))

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...metric.evaluation import COLUMNS, Result
+from ...comparison.judge import Judge
+from ...metric.evaluation import Result
 from ...metric.geometry import Floats
 from ...metric.surface import triangle_areas, triangle_normals
 
@@ -17,8 +18,8 @@ class WorstPatch:
     """One of the lowest patches.
 
     Attributes:
-        patch: its row. score: its FMQM. blame: the feature that falls furthest below its own mean over
-            the patches. value: that feature's.
+        patch: its row. score: the judge's, of it. blame: which of the judge's features falls furthest below its own
+            mean over the patches. value: that feature's.
     """
 
     patch: int
@@ -27,16 +28,17 @@ class WorstPatch:
     value: float
 
 
-def worst_patches(result: Result, count: int) -> list[WorstPatch]:
-    """The patches of the lowest FMQM, worst first."""
-    score = result.patch_scores[:, COLUMNS.index("FMQM")]
-    usual = np.maximum(result.scores[:4], 1e-12)
+def worst_patches(result: Result, count: int, judge: Judge = Judge.FMQM) -> list[WorstPatch]:
+    """The patches that the judge scores lowest, worst first."""
+    score = result.of_patches(judge.column)
+    table = np.stack([result.of_patches(feature) for feature in judge.features], axis=1)
+    usual = np.maximum(table.mean(axis=0), 1e-12)
     worst = []
     for patch in np.argsort(score, kind="stable")[:count].tolist():
-        features = result.patch_scores[patch, :4]
+        features = table[patch]
         # Features have levels of their own; where all are at theirs, the lowest is named.
         feature = int(np.lexsort((features, np.round(features / usual, 6)))[0])
-        worst.append(WorstPatch(patch, float(score[patch]), COLUMNS[feature], float(features[feature])))
+        worst.append(WorstPatch(patch, float(score[patch]), judge.features[feature], float(features[feature])))
     return worst
 
 

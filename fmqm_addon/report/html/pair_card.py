@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A pair's section of the page: its score, words, pictures and features, and how far to trust it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+
+from ...comparison.judge import Judge
+from ..criteria import judge_of, shortfall
+from ..records import PERCEIVED, SHOWN, value_of
+from ..trust_table import Report, trust_lines
+from ..visual.colormap import NO_PATCH, score_colors
+from .fragments import MEGABYTE, bar, css, score, text
+
+Record = Mapping[str, Any]
+
+
+def pair_card(number: int, record: Record, name: str) -> str:
+    """The section of a record.
+
+    Args:
+        number: of the pair, from 1 on. name: short, for people.
+    """
+    path, judge = record["distorted"], judge_of(record)
+    whole_path = "" if name == path else f'<p class="faint">{text(path)}</p>'
+    parts = [
+        f'<div class="title"><div><h3>{text(name)}</h3>{whole_path}</div>'
+        f'<p class="score"><span class="faint">{judge.column}</span> {score(record, judge.column)}</p></div>',
+        f'<p class="bad">Too low: {missed}.</p>' if (missed := shortfall(record)) else "",
+    ]
+    if record["error"]:
+        parts.append(f'<p class="bad">Not scored: {text(record["error"])}</p>')
+    if record.get("explanation") and not record["error"]:
+        parts.append(f'<p class="words">{text(record["explanation"])}</p>')
+    if record["warnings"]:
+        items = "".join(f"<li>{text(warning)}</li>" for warning in record["warnings"])
+        parts.append(f'<ul class="warnings" aria-label="Warnings">{items}</ul>')
+    if pictures := record.get("pictures"):
+        parts.append(_views(name, pictures))
+    if record["FMQM"] is not None:
+        close_ups = _close_ups(pictures["worst"], Judge(pictures["judge"])) if pictures else ""
+        parts.append(
+            f'<div class="panels"><div><h4>FMQM and its features</h4>{_numbers(record, SHOWN)}'
+            f"{_attribution(record.get('attribution'))}"
+            f"<h4>Perceived and its features</h4>{_numbers(record, PERCEIVED)}</div>{close_ups}</div>"
+        )
+    if record.get("trust"):
+        parts.append(_trust(record["trust"]))
+    return f'<article class="card" id="pair-{number}">{"".join(parts)}</article>\n'
+
+
+def _numbers(record: Record, columns: Iterable[str]) -> str:
+    rows = "".join(
+        f"<dt>{name.replace('_', ' ')}</dt><dd>{bar(value_of(record, name))}</dd>"
+        f'<dd class="number">{score(record, name)}</dd>'
+        for name in columns
+    )
+    return f'<dl class="features">{rows}</dl>'
+
+
+def _attribution(attribution: Record | None) -> str:
+    if attribution is None:
+        return ""
+    return (
+        f'<p class="note">{escape(attribution["phrase"][:1].upper() + attribution["phrase"][1:])}: '
+        f"{attribution['geometry_loss']:.3f} of FMQM with the geometry alone distorted, "
+        f"{attribution['texture_loss']:.3f} with the texture alone.</p>"
+    )
+
+
+def _views(name: str, pictures: Record) -> str:
+    """The three pictures on one camera; the worst patches that can be seen there are marked on the last."""
+    marks = "".join(
+        f'<span class="mark" style="left:{100 * worst["at"][0]:.1f}%;top:{100 * worst["at"][1]:.1f}%">{rank}</span>'
+        for rank, worst in enumerate(pictures["worst"], 1)
+        if worst["at"] is not None
+    )
+    costs = [
+        f"{triangles:,} triangles, {size / MEGABYTE:.1f} MB of textures"
+        for triangles, size in zip(pictures["triangles"], pictures["texture_bytes"], strict=True)
+    ]
+    size, judge = tuple(pictures["size"]), Judge(pictures["judge"])
+    figures = (
+        (_image(pictures["reference"], f"Reference of {name}", size), "Reference", costs[0]),
+        (_image(pictures["distorted"], f"Distorted: {name}", size), "Distorted", costs[1]),
+        (_image(pictures["heat"], f"Reference colored by the {judge.column} of {name}", size) + marks, "Heat map", ""),
+    )
+    return '<div class="views">' + "".join(
+        f'<figure><div class="picture">{picture}</div><figcaption><strong>{title}</strong> {caption}'
+        f"{_legend(judge, pictures['has_gaps']) if title == 'Heat map' else ''}</figcaption></figure>"
+        for picture, title, caption in figures
+    ) + "</div>"  # fmt: skip
+
+
+def _legend(judge: Judge, has_gaps: bool) -> str:
+    stops = ",".join(css(color) for color in score_colors(np.linspace(0, 1, 9)))
+    gap = f'<span class="gap" style="background:{css(np.array(NO_PATCH))}"></span>no patch' if has_gaps else ""
+    ramp = f'<span class="ramp" style="background:linear-gradient(90deg,{stops})"></span>'
+    return f'<span class="legend">{judge.column} 0{ramp}1 {gap}</span>'
+
+
+def _close_ups(worst: Sequence[Record], judge: Judge) -> str:
+    if not worst:
+        return '<div><h4>Worst patches</h4><p class="note">None: every patch is like the reference\'s.</p></div>'
+    figures = "".join(
+        f'<figure><div class="picture two">{_image(each["reference"], f"Worst patch {rank}, reference")}'
+        f"{_image(each['distorted'], f'Worst patch {rank}, distorted')}</div>"
+        f"<figcaption><strong>{rank}</strong> {judge.column} {each[judge.column]:.3f}; {escape(each['blame'])} "
+        f"{each['value']:.3f}</figcaption></figure>"
+        for rank, each in enumerate(worst, 1)
+    )
+    return (
+        f"<div><h4>Worst patches: reference, distorted; their {judge.column} and what lowers it most</h4>"
+        f'<div class="close-ups">{figures}</div></div>'
+    )
+
+
+def _image(path: str, alt: str, size: tuple[int, int] | None = None) -> str:
+    sized = "" if size is None else ' width="{}" height="{}"'.format(*(escape(str(side)) for side in size))
+    return f'<img src="{escape(quote(path))}" alt="{escape(alt)}"{sized} loading="lazy">'
+
+
+def _trust(trust: Report) -> str:
+    """The facts behind a score: those of both meshes side by side, then those of the pair."""
+    rows = []
+    for line in trust_lines(trust):
+        first = f"<td>{text(line.values[0])}</td>" if len(line.values) > 1 else ""
+        last = f"<td>{text(line.values[-1])}</td>" if first else f'<td colspan="2">{text(line.values[0])}</td>'
+        rows.append(
+            f'<tr><th scope="row">{text(line.label)}</th>{first}{last}<td class="faint">{text(line.unit)}</td></tr>'
+        )
+    return (
+        '<details><summary>How far to trust this score</summary><div class="scroll" tabindex="0" role="region" '
+        'aria-label="Trust report"><table><thead><tr><td></td><th scope="col">Reference</th>'
+        f'<th scope="col">Distorted</th><th scope="col">Unit</th></tr></thead><tbody>{"".join(rows)}</tbody></table>'
+        "</div></details>"
+    )
