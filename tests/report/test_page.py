@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 
 from fmqm_addon.blender.scene.bvh import BVHQuery
+from fmqm_addon.comparison.judge import Judge
 from fmqm_addon.metric.errors import FileError, FMQMError
 from fmqm_addon.metric.surface import MeshArrays, Surface, prepare_surface
 from fmqm_addon.metric.texture import Material, PlainColor, Texture
@@ -90,7 +91,7 @@ def test_pictures_of_a_pair(tmp_path: Path) -> None:
     image = pytest.importorskip("PIL.Image")
     reference, distorted, result = compared(8, FEW)
     open_report_folder(str(tmp_path))
-    made = write_pair_pictures(str(tmp_path), "pair", reference, distorted, result)
+    made = write_pair_pictures(str(tmp_path), "pair", reference, distorted, result, Judge.FMQM)
     assert json.loads(json.dumps(made, allow_nan=False)) == json.loads(json.dumps(made))
     assert made["triangles"] == [128, 2] and made["texture_bytes"] == [16, 16]
     worst = [patch["FMQM"] for patch in made["worst"]]
@@ -112,7 +113,7 @@ def test_equal_surfaces_have_no_worst_patches(tmp_path: Path) -> None:
     reference, _, result = compared(8, FEW)
     open_report_folder(str(tmp_path))
     same = np.ones_like(result.patch_scores)
-    made = write_pair_pictures(str(tmp_path), "pair", reference, reference, replace(result, patch_scores=same))
+    made = write_pair_pictures(str(tmp_path), "pair", reference, reference, replace(result, patch_scores=same), Judge.FMQM)
     assert made["worst"] == []
     assert "None: every patch is like the reference" in Page(record(score=1.0, pictures=made)).text
 
@@ -263,7 +264,7 @@ def test_a_chain_has_two_curves() -> None:
 
 def test_the_curve_rises_with_the_costs() -> None:
     levels = [Level("b", 2000, 0.8), Level(HOSTILE, 500, 0.33), Level("ref", 8000, 1.0, True)]
-    drawn = ElementTree.fromstring(curve_svg(levels, "triangles").replace("<svg", f'<svg xmlns="{SVG[1:-1]}"', 1))
+    drawn = ElementTree.fromstring(curve_svg(levels, "triangles", "FMQM").replace("<svg", f'<svg xmlns="{SVG[1:-1]}"', 1))
     circles = drawn.findall(f"{SVG}circle")
     x, y = (np.array([float(circle.attrib[name]) for circle in circles]) for name in ("cx", "cy"))
     assert np.diff(x) == pytest.approx([np.diff(x)[0]] * 2)  # four times as many, each
@@ -275,11 +276,11 @@ def test_the_curve_rises_with_the_costs() -> None:
 
 def test_names_on_the_curve_do_not_overlap_and_only_a_chain_is_joined() -> None:
     alike = [Level(f"pair {k}", 1000, 0.9 + 0.001 * k) for k in range(5)]
-    assert curve_svg(alike, "triangles").count('class="level"') == 1
-    assert curve_svg(alike, "triangles").count("<circle") == 5
-    assert "polyline" not in curve_svg(alike, "triangles")
+    assert curve_svg(alike, "triangles", "FMQM").count('class="level"') == 1
+    assert curve_svg(alike, "triangles", "FMQM").count("<circle") == 5
+    assert "polyline" not in curve_svg(alike, "triangles", "FMQM")
     chain = [Level(f"LOD{k}", 8000 >> k, 1 - 0.2 * k) for k in range(4)]
-    assert curve_svg(chain, "triangles").count('class="level"') == 4 and "polyline" in curve_svg(chain, "triangles")
+    assert curve_svg(chain, "triangles", "FMQM").count('class="level"') == 4 and "polyline" in curve_svg(chain, "triangles", "FMQM")
 
 
 def test_the_page_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
