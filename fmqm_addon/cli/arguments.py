@@ -8,6 +8,7 @@ import os
 from collections.abc import Sequence
 from typing import Any, NoReturn, TextIO
 
+from ..comparison.judge import Judge
 from ..metric.errors import SettingsError
 from ..metric.settings import PRESETS, SETTING_NAMES, Settings, info_of
 from .process import WRONG_ARGUMENTS
@@ -69,6 +70,18 @@ def check_access(args: argparse.Namespace) -> None:
         raise SettingsError("--asset-root is for --untrusted; give both")
     if not os.path.isdir(args.asset_root):
         raise SettingsError(f"--asset-root {args.asset_root}: no such folder")
+
+
+def add_judge(parser: argparse._ActionsContainer, decides: str) -> None:
+    """The flag of which reading decides.
+
+    Args:
+        decides: about what.
+    """
+    parser.add_argument(
+        "--judge", type=Judge, choices=list(Judge), metavar="{" + ",".join(Judge) + "}",
+        help=f"which reading decides: {decides} (default: {Judge.FMQM})",
+    )  # fmt: skip
 
 
 def flag_of(name: str | Sequence[str]) -> str:

@@ -2,7 +2,7 @@
 """Find the fewest triangles, or the smallest textures, with which an asset still looks like itself.
 
 fmqm decimate REFERENCE --target-fmqm 0.9 -o out.glb
-python scripts/decimate.py REFERENCE --target-fmqm 0.9 -o out.glb
+python scripts/decimate.py REFERENCE --judge perceived --target 0.95 -o out.glb
 blender -b -q --python scripts/decimate.py -- REFERENCE --chain 0.95,0.9,0.8 -o lods.glb
 """
 
@@ -21,9 +21,10 @@ from ..batch.progress_log import Log
 from ..batch.scorer import REMEDIES
 from ..blender.access import Access
 from ..blender.materials.types import Reading
+from ..comparison.judge import Judge
 from ..metric.errors import FMQMError, OutsideError, SettingsError, one_line
 from ..metric.settings import PRESETS, Settings
-from .arguments import OneLineParser, add_access, add_option, check_access, settings_of
+from .arguments import OneLineParser, add_access, add_judge, add_option, check_access, settings_of
 from .process import FAILED, OK, prepare_bpy, run_script
 
 PROGRAM = "decimate.py"
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
 def build_parser(program: str) -> OneLineParser:
     parser = OneLineParser(
         prog=program,
-        description="The fewest triangles (Decimate, collapse) or the smallest textures whose FMQM is at or above a "
+        description="The fewest triangles (Decimate, collapse) or the smallest textures whose score is at or above a "
         "target, found by bisection.",
         epilog="With -o the versions that decide are scored as they are read back from such a file. Exit codes: 0 "
         "found and written; 1 the target is missed even by the dearest version allowed, or a file cannot be read or "
@@ -44,13 +45,15 @@ def build_parser(program: str) -> OneLineParser:
     )
     parser.set_defaults(program=program)
     parser.add_argument("reference", metavar="REFERENCE", help="the original, as for score.py")
-    parser.add_argument("--target-fmqm", type=float, metavar="X", help="fewest triangles with at least this FMQM")
+    parser.add_argument("--target", type=float, metavar="X", help="fewest triangles with at least the judge's score X")
+    parser.add_argument("--target-fmqm", type=float, metavar="X", help="the same, with FMQM as the judge")
     parser.add_argument("--chain", type=_numbers, metavar="X,Y,...", help="the same for several targets, a file each")
+    add_judge(parser, "whose scores --target, --chain and --target-texture are")
     parser.add_argument("--max-triangles", type=int, metavar="N", help="never more triangles than this")
     parser.add_argument(
         "--target-texture", type=float, metavar="X",
-        help="smallest textures (powers of two) with which the result still has at least this FMQM; after "
-        "--target-fmqm, of the decimated asset",
+        help="smallest textures (powers of two) with which the result still has at least this score; after "
+        "--target, of the decimated asset",
     )  # fmt: skip
     parser.add_argument("--preset", choices=PRESETS, default="paper", help="what decides; searching is always fast")
     for name in ("samples", "patches", "seed"):
@@ -97,17 +100,22 @@ def main(argv: Sequence[str], out: TextIO, program: str = PROGRAM) -> int:
 
 def _targets(args: argparse.Namespace) -> list[float]:
     """Of the geometry; none where only the textures are to get smaller."""
-    if args.target_fmqm is not None and args.chain:
-        raise SettingsError("--target-fmqm and --chain are both given; give one of them")
-    targets = args.chain or ([] if args.target_fmqm is None else [args.target_fmqm])
+    asked = {"--target": args.target, "--target-fmqm": args.target_fmqm, "--chain": args.chain or None}
+    given = [flag for flag, value in asked.items() if value is not None]
+    if len(given) > 1:
+        raise SettingsError(f"{given[0]} and {given[1]} are both given; give one of them")
+    if args.target_fmqm is not None and args.judge not in (None, Judge.FMQM):
+        raise SettingsError(f"--target-fmqm is judged by FMQM; give --target for --judge {args.judge}")
+    single = args.target if args.target_fmqm is None else args.target_fmqm
+    targets = args.chain or ([] if single is None else [single])
     wanted = [*targets, *([] if args.target_texture is None else [args.target_texture])]
     if not wanted:
-        raise SettingsError("nothing is asked for; give --target-fmqm, --chain or --target-texture")
+        raise SettingsError("nothing is asked for; give --target, --chain or --target-texture")
     for target in wanted:
         if not (math.isfinite(target) and 0 < target <= 1):
             raise SettingsError(f"the target is {target}; it must be above 0 and at most 1")
     if args.max_triangles is not None and not targets:
-        raise SettingsError("--max-triangles needs --target-fmqm or --chain")
+        raise SettingsError("--max-triangles needs --target or --chain")
     return targets
 
 
@@ -126,6 +134,7 @@ def _search(args: argparse.Namespace, targets: list[float], settings: Settings, 
     from ..comparison.decimation import DecimationGoal, decimating
     from ..report.atomic_files import check_writable, print_parts, write_text
 
+    judge = args.judge or Judge.FMQM
     outputs = _output_names(args.output, targets if args.chain else [])
     for path in outputs:
         check_ending(path)
@@ -137,7 +146,7 @@ def _search(args: argparse.Namespace, targets: list[float], settings: Settings, 
         check_outputs(args.reference, files, reading)
     with defer_interrupts():
         sizes = () if args.target_texture is None else tuple(texture_sizes(args.reference, reading))
-    goal = DecimationGoal(tuple(targets), args.max_triangles, args.target_texture, sizes)
+    goal = DecimationGoal(tuple(targets), args.max_triangles, args.target_texture, sizes, judge)
     written = written_reader(args.reference, outputs[0], reading) if outputs else None
     stepper = decimating(file_reader(args.reference, reading), BVHQuery, goal, settings, written)
     more = True
@@ -152,7 +161,7 @@ def _search(args: argparse.Namespace, targets: list[float], settings: Settings, 
     saved: list[str | None] = [None] * len(result.results)
     for number, outcome in enumerate(result.results):
         if not outcome.last.reached:
-            errors.append(f"{args.reference}: {_missed(outcome, args.max_triangles, args.output)}")
+            errors.append(f"{args.reference}: {_missed(outcome, judge, args.max_triangles, args.output)}")
         elif outputs:
             try:
                 with defer_interrupts():
@@ -160,7 +169,7 @@ def _search(args: argparse.Namespace, targets: list[float], settings: Settings, 
                 saved[number] = outputs[number]
             except FMQMError as error:
                 errors.append(str(error))
-    document = _json_text(args.reference, settings, result, saved)
+    document = _json_text(args.reference, judge, settings, result, saved)
     if args.json and args.json != "-":
         write_text(args.json, document)
     print_parts(out, [document if args.json == "-" else _table(result, saved)])
@@ -177,9 +186,10 @@ def _output_names(output: str | None, chain: list[float]) -> list[str]:
     return [str(path.with_name(f"{path.stem}_LOD{number + 1}{path.suffix}")) for number in range(len(chain))]
 
 
-def _missed(outcome: TargetResult, max_triangles: int | None, output: str | None) -> str:
+def _missed(outcome: TargetResult, judge: Judge, max_triangles: int | None, output: str | None) -> str:
     best, target = outcome.last.best, outcome.last.target
-    score = "nothing that could be measured" if best.fmqm is None else f"FMQM {best.fmqm:.4f}"
+    score = best.score(judge)
+    reached = "nothing that could be measured" if score is None else f"{judge.column} {score:.4f}"
     kind, remedy = "", "ask for less"
     if max_triangles is not None and outcome.texture is None:
         remedy += ", or allow more"
@@ -189,7 +199,7 @@ def _missed(outcome: TargetResult, max_triangles: int | None, output: str | None
     allowed = "all triangles" if max_triangles is None else f"the {max_triangles} triangles that are allowed"
     if outcome.texture is not None:
         allowed = "the textures as they are"
-    return f"the target {target:g} is missed even with {allowed}{kind} ({score}); {remedy}"
+    return f"the target {target:g} is missed even with {allowed}{kind} ({reached}); {remedy}"
 
 
 def _table(result: DecimationResult, saved: Sequence[str | None]) -> str:
@@ -204,7 +214,7 @@ def _table(result: DecimationResult, saved: Sequence[str | None]) -> str:
             if path is not None and found is outcome.last:
                 verdict += f", written to {path}"
             rows.append((f"{found.target:g}", *_cells(found.best), verdict))
-    rows.insert(0, ("target", "ratio", "triangles", "texture", "FMQM", ""))
+    rows.insert(0, ("target", "ratio", "triangles", "texture", "FMQM", "perceived", ""))
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     return "".join(
         "  ".join(cell.rjust(width) for cell, width in zip(row[:-1], widths, strict=False))
@@ -214,15 +224,19 @@ def _table(result: DecimationResult, saved: Sequence[str | None]) -> str:
     )
 
 
-def _cells(step: Step) -> tuple[str, str, str, str]:
+def _cells(step: Step) -> tuple[str, ...]:
     texture = "-" if step.version.texture is None else str(step.version.texture)
-    return f"{step.version.ratio:.4f}", str(step.triangles), texture, "-" if step.fmqm is None else f"{step.fmqm:.4f}"
+    scores = ("-" if score is None else f"{score:.4f}" for score in (step.fmqm, step.perceived))
+    return f"{step.version.ratio:.4f}", str(step.triangles), texture, *scores
 
 
-def _json_text(reference: str, settings: Settings, result: DecimationResult, saved: Sequence[str | None]) -> str:
+def _json_text(
+    reference: str, judge: Judge, settings: Settings, result: DecimationResult, saved: Sequence[str | None]
+) -> str:
     document = {
         "reference": reference,
         "triangles": result.triangles,
+        "judge": judge,
         "settings": settings.as_dict(),
         "warnings": list(result.warnings),
         "found": [
@@ -246,7 +260,8 @@ def _found_dict(found: SearchResult | None) -> dict[str, Any] | None:
 
 
 def _step_dict(step: Step) -> dict[str, Any]:
-    return {**asdict(step.version), "triangles": step.triangles, "FMQM": step.fmqm, "fast": step.quick}
+    scores = {"FMQM": step.fmqm, "perceived": step.perceived}
+    return {**asdict(step.version), "triangles": step.triangles, **scores, "fast": step.quick}
 
 
 if __name__ == "__main__":

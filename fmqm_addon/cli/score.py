@@ -41,6 +41,7 @@ from .process import (
 from .score_arguments import (
     build_parser,
     check_arguments,
+    criteria_of,
     digest_of,
     journal_path,
     options_of,
@@ -138,7 +139,7 @@ def _score(
     waiting = {
         key: Task(key, row)
         for key, row in zip(keys, rows, strict=True)
-        if not journal.has_scores(key) or not has_pictures(args.report, journal.record(key))
+        if not journal.has_scores(key) or not has_pictures(args.report, journal.record(key), options.judge)
     }
     tasks = list(waiting.values())
     # A pair that ends its process, as some files do, shall be an error of its own.
@@ -163,7 +164,7 @@ def _score(
         raise
     except OSError as error:
         raise FileError(f"{folder or os.curdir}: workers need a folder here ({error.strerror or error})") from error
-    records = Records(rows, keys, journal, args.fail_under)
+    records = Records(rows, keys, journal, criteria_of(args))
     write_outputs(args, records, options.as_dict(), versions, last, out)
     code = exit_code(records)
     batch = args.manifest or args.glob or args.lods or args.jobs or args.dask or args.journal or args.resume
@@ -172,7 +173,7 @@ def _score(
 
 
 def _merge(args: argparse.Namespace, rows: list[Row] | None, out: TextIO) -> int:
-    merged = Merged(args.merge, rows, Log(args.program, 1, 1), args.fail_under)
+    merged = Merged(args.merge, rows, Log(args.program, 1, 1), criteria_of(args))
     write_outputs(args, merged, merged.settings, merged.versions, None, out)
     return exit_code(merged)
 

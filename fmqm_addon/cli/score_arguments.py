@@ -14,12 +14,14 @@ from ..batch.workers import Limits
 from ..blender.access import Access
 from ..blender.materials.image_headers import DEFAULT_LIMITS, ImageLimits
 from ..blender.materials.types import Reading
+from ..comparison.judge import Judge
 from ..comparison.pair import PairOptions
 from ..metric.errors import SettingsError
 from ..metric.settings import PRESETS, SETTING_NAMES, Settings
 from ..report.atomic_files import STDOUT
+from ..report.criteria import Criteria
 from ..report.html.page import PAGE
-from .arguments import OneLineParser, add_access, add_option, check_access, flag_of, settings_of
+from .arguments import OneLineParser, add_access, add_judge, add_option, check_access, flag_of, settings_of
 
 PAIR_NAMES = tuple(each.name for each in fields(PairOptions) if each.name != "settings")
 _LONGEST_NAME = 255  # bytes, where file systems are common
@@ -115,7 +117,12 @@ def build_parser(program: str) -> OneLineParser:
     output.add_argument("--save-fields", metavar="FILE.npz", help="samples, fields and patch scores of the one pair")
     output.add_argument("--picture", metavar="FILE.png", help="reference, distorted and heat map of the one pair")
     output.add_argument("--explain", action="store_true", help="a paragraph a pair: what got worse, where, how surely")
-    output.add_argument("--fail-under", type=float, metavar="X", help="exit code 1 if an FMQM is below X")
+    add_judge(output, "about --fail-under, a manifest's fail_under, heat maps and worst places")
+    output.add_argument("--fail-under", type=float, metavar="X", help="exit code 1 if a score is below X")
+    output.add_argument(
+        "--fail-under-p10", type=float, metavar="X",
+        help="exit code 1 if the 10th percentile over a pair's patches is below X: its worst places",
+    )  # fmt: skip
     output.add_argument("--verbose", action="store_true", help="how far to trust each score: the facts, in a table")
     output.add_argument("--quiet", action="store_true", help="no progress on stderr")
     return parser
@@ -135,7 +142,8 @@ def options_of(args: argparse.Namespace) -> BatchOptions:
         access=Access(args.untrusted, args.asset_root or ""),
     )
     pair = PairOptions(settings=settings_of(args), **given)
-    return BatchOptions(pair=pair, reading=reading, explain=args.explain, report=args.report or "")
+    judge = args.judge or Judge.FMQM
+    return BatchOptions(pair=pair, reading=reading, explain=args.explain, report=args.report or "", judge=judge)
 
 
 def check_arguments(args: argparse.Namespace) -> None:
@@ -143,8 +151,9 @@ def check_arguments(args: argparse.Namespace) -> None:
         limit = getattr(args, flag)
         if limit is not None and limit < 1:
             raise SettingsError(f"{flag.replace('_', '-')} is {limit}; it must be at least 1")
-    if args.fail_under is not None and not 0 <= args.fail_under <= 1:
-        raise SettingsError(f"fail-under is {args.fail_under}; it must be between 0 and 1")
+    for flag, least in (("fail-under", args.fail_under), ("fail-under-p10", args.fail_under_p10)):
+        if least is not None and not 0 <= least <= 1:
+            raise SettingsError(f"{flag} is {least}; it must be between 0 and 1")
     for flag, ending in (("save_fields", ".npz"), ("picture", ".png")):
         path = getattr(args, flag)
         if path and not path.lower().endswith(ending):
@@ -183,6 +192,11 @@ def check_arguments(args: argparse.Namespace) -> None:
             raise SettingsError(f"{flag_of(flag)} takes exactly one DISTORTED; {len(args.distorted)} are given")
         if args.jobs or args.dask or args.resume or args.shard or args.timeout or args.memory_limit or args.untrusted:
             raise SettingsError(f"{flag_of(flag)} is of a pair that this process scores; leave out the batch's flags")
+
+
+def criteria_of(args: argparse.Namespace) -> Criteria:
+    """What all pairs must reach."""
+    return Criteria(args.judge, args.fail_under, args.fail_under_p10)
 
 
 def _check_sources(args: argparse.Namespace) -> None:

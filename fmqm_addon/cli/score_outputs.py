@@ -9,11 +9,13 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, TextIO
 
 from ..batch.progress_log import Log
+from ..comparison.judge import Judge
 from ..report.atomic_files import STDOUT, check_apart, print_parts, write_parts
+from ..report.criteria import below, shortfall
 from ..report.explain import explain
 from ..report.html.page import write_page
 from ..report.junit import junit_parts
-from ..report.records import below, csv_parts, json_parts, shortfall, table_parts, trust_parts
+from ..report.records import csv_parts, json_parts, table_parts, trust_parts
 from .process import FAILED, OK
 from .score_arguments import output_files, page_file, shard_of
 
@@ -59,7 +61,7 @@ def _write_last(args: argparse.Namespace, last: PairResult) -> None:
     if args.save_fields:
         save_fields(args.save_fields, result)
     if args.picture:
-        write_picture(args.picture, last.reference, last.comparison.distorted, result)
+        write_picture(args.picture, last.reference, last.comparison.distorted, result, judge=args.judge or Judge.FMQM)
 
 
 def _table_parts(args: argparse.Namespace, records: Iterable[Mapping[str, Any]]) -> Iterator[str]:

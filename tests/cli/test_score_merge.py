@@ -15,7 +15,7 @@ import pytest
 from fmqm_addon.cli.score import main
 from fmqm_addon.report.criteria import ANYTHING
 from fmqm_addon.report.records import PairScore, pair_record
-from tests.readings import all_alike
+from tests.readings import all_alike, numbers
 
 HEAD = {"fmqm_version": "1", "fmqm_code": "c", "blender_version": "4", "settings": {}}
 
@@ -150,12 +150,13 @@ def test_parts_of_different_code_do_not_mix(tmp_path: Path, name: str, capsys: p
 HOSTILE = '"><script>alert(1)</script>'
 PICTURES = {
     **{name: f"pictures/{name}.jpg" for name in ("reference", "distorted", "heat")},
-    "size": [4, 3], "triangles": [2, 1], "texture_bytes": [0, 0], "has_gaps": False, "worst": [],
+    "size": [4, 3], "triangles": [2, 1], "texture_bytes": [0, 0], "judge": "fmqm", "has_gaps": False, "worst": [],
 }  # fmt: skip
 WORST = {
     "reference": "pictures/r.jpg",
     "distorted": "pictures/d.jpg",
     "FMQM": 0.5,
+    "perceived": 0.5,
     "value": 0.5,
     "blame": "x",
     "at": None,
@@ -171,7 +172,10 @@ def test_pictures_of_a_part_are_taken(tmp_path: Path) -> None:
     "more",
     [
         *({name: HOSTILE} for name in ("FMQM", "stderr", "seconds", "warnings", "fail_under", "patches", "settings")),
-        {"reverse": {"FMQM": HOSTILE}}, {"attribution": {"phrase": HOSTILE}},
+        *({name: HOSTILE} for name in ("fail_under_p10", "fmqm_p10", "judge", "perceived")),
+        {"perceived": numbers(0.5)["perceived"] | {"p10": HOSTILE}}, {"perceived": numbers(None)["perceived"]},
+        {"perceived": numbers(0.5)["perceived"] | {"stderr": {"score": HOSTILE}}},
+        {"reverse": numbers(0.5) | {"perceived": None}}, {"reverse": {"FMQM": HOSTILE}}, {"attribution": {"phrase": HOSTILE}},
         {"pictures": HOSTILE}, {"id": 7}, {"trust": {"reference": {}, "distorted": {}, "pair": HOSTILE}},
         *({"pictures": PICTURES | {name: HOSTILE}} for name in PICTURES),
         *({"pictures": PICTURES | {"heat": path}} for path in ("//host/a.jpg", "../a.jpg", "pictures/../../a.jpg")),

@@ -24,7 +24,7 @@ from fmqm_addon.metric.errors import FileError, FMQMError
 from fmqm_addon.metric.surface import MeshArrays, Surface, prepare_surface
 from fmqm_addon.metric.texture import Material, PlainColor, Texture
 from fmqm_addon.report import render as rendering
-from fmqm_addon.report.criteria import ANYTHING
+from fmqm_addon.report.criteria import ANYTHING, Criteria
 from fmqm_addon.report.html import pictures as pair_pictures
 from fmqm_addon.report.html.chain_curve import Level, curve_svg
 from fmqm_addon.report.html.page import page_parts, write_page
@@ -113,7 +113,9 @@ def test_equal_surfaces_have_no_worst_patches(tmp_path: Path) -> None:
     reference, _, result = compared(8, FEW)
     open_report_folder(str(tmp_path))
     same = np.ones_like(result.patch_scores)
-    made = write_pair_pictures(str(tmp_path), "pair", reference, reference, replace(result, patch_scores=same), Judge.FMQM)
+    made = write_pair_pictures(
+        str(tmp_path), "pair", reference, reference, replace(result, patch_scores=same), Judge.FMQM
+    )
     assert made["worst"] == []
     assert "None: every patch is like the reference" in Page(record(score=1.0, pictures=made)).text
 
@@ -264,7 +266,9 @@ def test_a_chain_has_two_curves() -> None:
 
 def test_the_curve_rises_with_the_costs() -> None:
     levels = [Level("b", 2000, 0.8), Level(HOSTILE, 500, 0.33), Level("ref", 8000, 1.0, True)]
-    drawn = ElementTree.fromstring(curve_svg(levels, "triangles", "FMQM").replace("<svg", f'<svg xmlns="{SVG[1:-1]}"', 1))
+    drawn = ElementTree.fromstring(
+        curve_svg(levels, "triangles", "FMQM").replace("<svg", f'<svg xmlns="{SVG[1:-1]}"', 1)
+    )
     circles = drawn.findall(f"{SVG}circle")
     x, y = (np.array([float(circle.attrib[name]) for circle in circles]) for name in ("cx", "cy"))
     assert np.diff(x) == pytest.approx([np.diff(x)[0]] * 2)  # four times as many, each
@@ -280,7 +284,9 @@ def test_names_on_the_curve_do_not_overlap_and_only_a_chain_is_joined() -> None:
     assert curve_svg(alike, "triangles", "FMQM").count("<circle") == 5
     assert "polyline" not in curve_svg(alike, "triangles", "FMQM")
     chain = [Level(f"LOD{k}", 8000 >> k, 1 - 0.2 * k) for k in range(4)]
-    assert curve_svg(chain, "triangles", "FMQM").count('class="level"') == 4 and "polyline" in curve_svg(chain, "triangles", "FMQM")
+    assert curve_svg(chain, "triangles", "FMQM").count('class="level"') == 4 and "polyline" in curve_svg(
+        chain, "triangles", "FMQM"
+    )
 
 
 def test_the_page_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
@@ -300,12 +306,19 @@ def test_words_losses_and_thresholds_are_shown_where_there_are_any() -> None:
         "It looks bad.",
         "Most of the loss is the texture: 0.010",
         "0.432 with",
-        "below 0.75",
-        "threshold, 0.75",
+        "Too low: FMQM 0.5000 is below 0.75.",
     ):
         assert text in told.text
     plain = Page(record(fail_under=0.5))
-    assert "loss" not in plain.text and "below" not in plain.text and "threshold, " not in plain.text
+    assert "loss" not in plain.text and "below" not in plain.text and "Too low" not in plain.text
+
+
+def test_the_judge_names_the_scores() -> None:
+    numbers = {"perceived": {**record()["perceived"], "score": 0.9, "p10": 0.25}}
+    chain = [record(f"lod{k}.glb", pictures=costs(900 - k, 1 << k) | {"judge": "perceived"}) for k in (1, 2)]
+    page = Page(*(each | numbers | Criteria(Judge.PERCEIVED, 0.75, 0.5).told() for each in chain))
+    assert "Lowest perceived: 0.9000" in page.text and "perceived against triangles" in page.text
+    assert page.text.count("perceived_p10 0.2500 is below 0.5") == 4 and "0.9000 is below" not in page.text
 
 
 # score.py --report
