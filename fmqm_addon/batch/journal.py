@@ -261,4 +261,4 @@ class Records:
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
         for row, key in zip(self._rows, self._keys, strict=True):
-            yield self._journal.record(key) | row.record_fields() | self._criteria.told(row.fail_under)
+            yield self._journal.record(key) | row.record_fields() | self._criteria.record_fields(row.fail_under)

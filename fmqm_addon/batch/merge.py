@@ -7,13 +7,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from ..metric.errors import FileError
-from ..report.criteria import ANYTHING, TOLD, Criteria
+from ..report.criteria import ANYTHING, FIELDS, Criteria
 from ..report.record_check import checked_json, is_settings, record_fault
 from .journal import Journal, differences
 from .progress_log import Log
 from .rows import Row
 
-_REQUIRED = ("settings", *TOLD)  # what a record of an output has besides
+_REQUIRED = ("settings", *FIELDS)  # what a record of an output has besides
 _MADE_BY = ("fmqm_version", "fmqm_code", "blender_version")
 
 
@@ -78,9 +78,9 @@ class Merged:
             row = self._rows.get(name)
             own = None if row is None else row.fail_under
             if name in self._journal:
-                yield self._journal.record(name) | self._criteria.wished(own)
+                yield self._journal.record(name) | self._criteria.given_fields(own)
             elif row is not None:
-                yield row.failed(self._gap(row)) | self._criteria.told(own)
+                yield row.failed(self._gap(row)) | self._criteria.record_fields(own)
 
     def _gap(self, row: Row) -> str:
         """Why there is no record."""

@@ -10,7 +10,7 @@ from typing import Any
 from ..comparison.judge import Judge
 from .records import value_of
 
-TOLD = ("judge", "fail_under", "fail_under_p10")  # by what a record tells of it
+FIELDS = ("judge", "fail_under", "fail_under_p10")  # by what a record tells of it
 
 
 @dataclass(frozen=True)
@@ -26,19 +26,19 @@ class Criteria:
     fail_under: float | None = None
     fail_under_p10: float | None = None
 
-    def told(self, fail_under: float | None = None) -> dict[str, Any]:
+    def record_fields(self, fail_under: float | None = None) -> dict[str, Any]:
         """What a record tells of it.
 
         Args:
             fail_under: of a pair that has its own.
         """
         least = self.fail_under if fail_under is None else fail_under
-        return dict(zip(TOLD, (str(self.judge or Judge.FMQM), least, self.fail_under_p10), strict=True))
+        return dict(zip(FIELDS, (str(self.judge or Judge.FMQM), least, self.fail_under_p10), strict=True))
 
-    def wished(self, fail_under: float | None = None) -> dict[str, Any]:
-        """As told(), without what nobody wishes."""
-        told = self.told(fail_under)
-        return {name: told[name] for name in TOLD if (name != "judge" or self.judge) and told[name] is not None}
+    def given_fields(self, fail_under: float | None = None) -> dict[str, Any]:
+        """As record_fields(), without what nobody wishes."""
+        fields = self.record_fields(fail_under)
+        return {name: fields[name] for name in FIELDS if (name != "judge" or self.judge) and fields[name] is not None}
 
 
 ANYTHING = Criteria()

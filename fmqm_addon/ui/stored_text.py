@@ -7,22 +7,52 @@ Panels ask at each redraw: what was read is remembered.
 from __future__ import annotations
 
 import functools
+import json
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
-from ..metric.evaluation import COLUMNS
+from ..comparison.measurement import Readings
+from ..metric.evaluation import Scores
+from ..metric.perceived import Perceived
 from ..metric.settings import SETTING_NAMES
 from ..report.record_check import checked_json, is_attribution, is_settings, is_trust
 from ..report.trust_table import Report
 
+T = TypeVar("T")
+
+
+def readings_text(readings: Readings) -> str:
+    """Both readings as the text that read_readings reads back bit by bit."""
+    return json.dumps({name: getattr(readings, name) for name in _READINGS}, allow_nan=False)
+
 
 @functools.lru_cache(1024)
-def read_columns(text: str) -> dict[str, float] | None:
-    """Five numbers by the names of metric.evaluation.COLUMNS."""
-    values = _read(text)
-    if not isinstance(values, list) or [type(value) for value in values] != [float] * len(COLUMNS):
+def read_readings(text: str) -> Readings | None:
+    """Both readings of a pair."""
+    found = _read(text)
+    if not isinstance(found, dict) or found.keys() != _READINGS.keys():
         return None
-    return dict(zip(COLUMNS, values, strict=True))
+    values = {name: make(found[name]) for name, make in _READINGS.items()}
+    if None in (values["scores"], values["perceived"], values["fmqm_p10"]):
+        return None
+    if any(values[name] is None for name in _ERRORS if found[name] is not None):
+        return None
+    return Readings(**values)
+
+
+def _doubles(value: object, kind: type[T]) -> T | None:
+    """A named tuple from a list of as many doubles."""
+    names: tuple[str, ...] = kind._fields  # type: ignore[attr-defined]
+    is_right = isinstance(value, list) and [type(each) for each in value] == [float] * len(names)
+    return kind(*value) if is_right else None  # type: ignore[misc]
+
+
+_ERRORS = ("stderr", "perceived_stderr")
+_READINGS: dict[str, Callable[[Any], Any]] = {
+    **dict.fromkeys(("scores", "stderr"), functools.partial(_doubles, kind=Scores)),
+    "fmqm_p10": lambda value: value if type(value) is float else None,
+    **dict.fromkeys(("perceived", "perceived_stderr"), functools.partial(_doubles, kind=Perceived)),
+}
 
 
 @functools.lru_cache(64)

@@ -22,7 +22,7 @@ HEAD = {"fmqm_version": "1", "fmqm_code": "c", "blender_version": "4", "settings
 
 def write_part(folder: Path, *names: str, **more: Any) -> str:
     """A part in which all scores are 0.5."""
-    told = {"settings": {}, **ANYTHING.told()}
+    told = {"settings": {}, **ANYTHING.record_fields()}
     records = [pair_record(PairScore("r", name, all_alike(0.5), patches=200)) | told for name in names]
     (folder / "part.json").write_text(json.dumps(HEAD | {"pairs": [record | more for record in records]}))
     return str(folder / "part.json")
@@ -175,7 +175,8 @@ def test_pictures_of_a_part_are_taken(tmp_path: Path) -> None:
         *({name: HOSTILE} for name in ("fail_under_p10", "fmqm_p10", "judge", "perceived")),
         {"perceived": numbers(0.5)["perceived"] | {"p10": HOSTILE}}, {"perceived": numbers(None)["perceived"]},
         {"perceived": numbers(0.5)["perceived"] | {"stderr": {"score": HOSTILE}}},
-        {"reverse": numbers(0.5) | {"perceived": None}}, {"reverse": {"FMQM": HOSTILE}}, {"attribution": {"phrase": HOSTILE}},
+        {"reverse": numbers(0.5) | {"perceived": None}}, {"reverse": {"FMQM": HOSTILE}},
+        {"attribution": {"phrase": HOSTILE}},
         {"pictures": HOSTILE}, {"id": 7}, {"trust": {"reference": {}, "distorted": {}, "pair": HOSTILE}},
         *({"pictures": PICTURES | {name: HOSTILE}} for name in PICTURES),
         *({"pictures": PICTURES | {"heat": path}} for path in ("//host/a.jpg", "../a.jpg", "pictures/../../a.jpg")),

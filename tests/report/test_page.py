@@ -45,7 +45,9 @@ def record(distorted: str = "lod.glb", score: float | None = 0.5, **others: Any)
     """A pair as JSON has it."""
     pair = {"id": distorted, "reference": "ref.glb", "distorted": distorted, **numbers(score), "stderr": None}
     return (
-        pair | {**ANYTHING.told(), "warnings": [], "error": None if score is not None else "it cannot be read"} | others
+        pair
+        | {**ANYTHING.record_fields(), "warnings": [], "error": None if score is not None else "it cannot be read"}
+        | others
     )
 
 
@@ -316,7 +318,7 @@ def test_words_losses_and_thresholds_are_shown_where_there_are_any() -> None:
 def test_the_judge_names_the_scores() -> None:
     numbers = {"perceived": {**record()["perceived"], "score": 0.9, "p10": 0.25}}
     chain = [record(f"lod{k}.glb", pictures=costs(900 - k, 1 << k) | {"judge": "perceived"}) for k in (1, 2)]
-    page = Page(*(each | numbers | Criteria(Judge.PERCEIVED, 0.75, 0.5).told() for each in chain))
+    page = Page(*(each | numbers | Criteria(Judge.PERCEIVED, 0.75, 0.5).record_fields() for each in chain))
     assert "Lowest perceived: 0.9000" in page.text and "perceived against triangles" in page.text
     assert page.text.count("perceived_p10 0.2500 is below 0.5") == 4 and "0.9000 is below" not in page.text
 

@@ -12,6 +12,7 @@ from ...blender.scene.decimate import decimated_copy, scene_reader
 from ...blender.scene.fingerprint import fingerprint
 from ...blender.scene.target import target_of
 from ...comparison.decimation import DecimationGoal, DecimationResult, SearchResult, Step, VersionReader, decimating
+from ...comparison.judge import Judge
 from ...metric.errors import FMQMError
 from ...metric.settings import Settings
 from ...metric.stepper import Stepper, Work
@@ -44,7 +45,9 @@ class FMQM_OT_decimate(SteppedOperator, bpy.types.Operator):  # noqa: N801
         goal = DecimationGoal(
             (round(fmqm.decimate.target, 4),),  # a property is float32: 0.9 must not become 0.90000004
             fmqm.decimate.max_triangles if fmqm.decimate.limited else None,
+            judge=Judge[fmqm.judge],
         )
+        self._judge = goal.judge
         try:
             settings = metric_settings(fmqm.settings)
         except FMQMError as error:
@@ -71,16 +74,17 @@ class FMQM_OT_decimate(SteppedOperator, bpy.types.Operator):  # noqa: N801
         if fingerprint(target_of(original), False) != self._mark:
             self.report({"WARNING"}, f"{self._name} was changed meanwhile; search again")
             return {"CANCELLED"}
-        best = found.best
-        _write_path(scene.fmqm.decimate, original.name, found)
+        best, judge = found.best, self._judge
+        score = best.score(judge)
+        _write_path(scene.fmqm.decimate, original.name, found, judge)
         if not found.reached:
             self.report(
                 {"WARNING"},
                 f"{self._name} misses {found.target:.2f} even with {best.triangles:,} triangles"
-                + ("" if best.fmqm is None else f" (FMQM {best.fmqm:.4f})"),
+                + ("" if score is None else f" ({judge.column} {score:.4f})"),
             )
             return {"CANCELLED"}
-        copy = decimated_copy(original, best.version.ratio, f"{original.name} FMQM {found.target:.2f}")
+        copy = decimated_copy(original, best.version.ratio, f"{original.name} {judge.column} {found.target:.2f}")
         context.view_layer.update()
         hidden = ""
         if copy.name in context.view_layer.objects:  # not in another scene, or where its collection is excluded
@@ -92,7 +96,7 @@ class FMQM_OT_decimate(SteppedOperator, bpy.types.Operator):  # noqa: N801
             hidden = f"; {original.name} is hidden, Alt H shows it"
         self.report(
             {"INFO"},
-            f"{copy.name}: {best.triangles:,} of {result.triangles:,} triangles, FMQM {best.fmqm:.4f}{hidden}",
+            f"{copy.name}: {best.triangles:,} of {result.triangles:,} triangles, {judge.column} {score:.4f}{hidden}",
         )
         return {"FINISHED"}
 
@@ -118,17 +122,18 @@ def _attempt(read: VersionReader, goal: DecimationGoal, settings: Settings) -> W
     return searching.result
 
 
-def _write_path(decimate: FMQMDecimate, name: str, found: SearchResult) -> None:
+def _write_path(decimate: FMQMDecimate, name: str, found: SearchResult, judge: Judge) -> None:
     """Its versions, from the most triangles down; "about" where few patches were looked at."""
     steps = sorted(found.path, key=lambda step: (-step.triangles, step.quick))
-    lines = list(dict.fromkeys(map(_step_text, steps)))
+    lines = list(dict.fromkeys(_step_text(step, judge) for step in steps))
     decimate.path, decimate.path_of = "\n".join(lines), name
-    decimate.found = lines.index(_step_text(found.best)) if found.reached else -1
+    decimate.found = lines.index(_step_text(found.best, judge)) if found.reached else -1
 
 
-def _step_text(step: Step) -> str:
-    score = "nothing left" if step.fmqm is None else f"{step.fmqm:.4f}"
-    return f"{step.triangles:,} triangles: {'about ' if step.quick else ''}{score}"
+def _step_text(step: Step, judge: Judge) -> str:
+    score = step.score(judge)
+    reached = "nothing left" if score is None else f"{score:.4f}"
+    return f"{step.triangles:,} triangles: {'about ' if step.quick else ''}{reached}"
 
 
 CLASSES = (FMQM_OT_decimate,)

@@ -14,10 +14,10 @@ from ...blender.scene.measure import Outcome, measuring
 from ...blender.scene.target import target_of
 from ...metric.errors import FMQMError
 from ...report.trust_table import trust_dict
-from .. import session, stale
+from .. import session, stale, stored_text
 from ..modal import SteppedOperator
 from ..properties.items import item_target
-from ..properties.rows import numbers_text, row_targets
+from ..properties.rows import row_targets
 from ..properties.scene import FMQMScene
 from ..properties.settings import pair_options
 from ..view.shown import forget_removed
@@ -129,13 +129,12 @@ def _write_row(fmqm: FMQMScene, outcome: Outcome, settings_text: str) -> None:
     row.stages = json.dumps(outcome.seconds)
     row.triangles = outcome.triangles
     row.share = 100 * outcome.triangles / outcome.reference_triangles if outcome.reference_triangles else 0.0
-    row.reverse = "" if outcome.reverse is None else numbers_text(outcome.reverse)
     row.attribution = "" if outcome.attribution is None else json.dumps(outcome.attribution.as_dict(), allow_nan=False)
     row.trust = "" if outcome.trust is None else json.dumps(trust_dict(outcome.trust), allow_nan=False)
     result, comparison = outcome.pair_result, outcome.comparison
     row.space = "" if result is None else result.alignment.label
-    row.scores = "" if comparison is None else numbers_text(comparison.scores)
-    row.stderr = "" if comparison is None or comparison.stderr is None else numbers_text(comparison.stderr)
+    row.reverse = "" if result is None or result.reverse is None else stored_text.readings_text(result.reverse)
+    row.scores = "" if comparison is None else stored_text.readings_text(comparison)
     row.patches = 0 if comparison is None else len(comparison.result.patches)
     row.samples = 0 if comparison is None else len(comparison.result.samples.positions)
     if result is not None:

@@ -7,7 +7,9 @@ from typing import ClassVar
 
 import bpy
 
+from ...comparison.judge import Judge
 from ..operators.decimate import FMQM_OT_decimate
+from ..properties.rows import EXPLAINED
 from .sidebar import Sidebar
 
 
@@ -21,7 +23,8 @@ class FMQM_PT_decimate(Sidebar, bpy.types.Panel):  # noqa: N801
     def draw(self, context: bpy.types.Context) -> None:
         layout, decimate = self.layout, context.scene.fmqm.decimate
         layout.use_property_split, layout.use_property_decorate = True, False
-        layout.prop(decimate, "target", slider=True)
+        label = f"Target {EXPLAINED[Judge[context.scene.fmqm.judge].column][0]}"
+        layout.prop(decimate, "target", text=label, slider=True)
         row = layout.row(heading="Max Triangles")
         row.prop(decimate, "limited", text="")
         number = row.row()

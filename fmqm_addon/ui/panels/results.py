@@ -6,8 +6,7 @@ from __future__ import annotations
 import bpy
 
 from ...comparison.alignment import SPACE_LABELS
-from ...metric.evaluation import COLUMNS
-from ...report.records import SHOWN
+from ...comparison.judge import Judge
 from .. import session
 from ..properties.rows import (
     EXPLAINED,
@@ -29,7 +28,7 @@ NOT_SEEN = "Normal maps, roughness and lighting are not part of FMQM"
 
 
 class FMQM_UL_rows(bpy.types.UIList):  # noqa: N801
-    """Name and score, greyed at other settings than the chosen row's; in a wide sidebar the four features too."""
+    """Name and the judge's score, in a wide sidebar its features too; greyed at other settings than the chosen row's."""
 
     def draw_item(
         self,
@@ -58,8 +57,10 @@ class FMQM_UL_rows(bpy.types.UIList):  # noqa: N801
         numbers = split.row()
         chosen = active_row(context.scene)
         numbers.active = chosen is None or comparable(row, chosen)
-        for name in SHOWN if wide else SHOWN[:1]:
-            numbers.label(text=f"{scores[name]:.4f}" if name == "FMQM" else f"{scores[name]:.2f}")
+        judge = Judge[fmqm.judge]
+        numbers.label(text=f"{scores[judge.column]:.4f}")
+        for name in judge.features if wide else ():
+            numbers.label(text=f"{scores[name]:.2f}")
 
 
 class FMQM_MT_results(bpy.types.Menu):  # noqa: N801
@@ -82,10 +83,11 @@ class FMQM_PT_results(Sidebar, bpy.types.Panel):  # noqa: N801
         if not fmqm.rows:
             layout.label(text="Nothing measured yet")
             return
+        layout.row().prop(fmqm, "judge", expand=True)
         row = layout.row()
         row.template_list("FMQM_UL_rows", "", fmqm, "rows", fmqm, "row_index", rows=3)
         side = row.column(align=True)
-        side.operator("fmqm.sort_rows", text="", icon="SORTSIZE").column = "FMQM"
+        side.operator("fmqm.sort_rows", text="", icon="SORTSIZE").column = Judge[fmqm.judge].column
         side.operator("fmqm.remove_row", text="", icon="REMOVE")
         side.separator()
         side.menu("FMQM_MT_results", text="", icon="DOWNARROW_HLT")
@@ -114,7 +116,9 @@ def _draw_row(layout: bpy.types.UILayout, context: bpy.types.Context, fmqm: FMQM
     if row.uid in session.stale:
         wrapped(layout, context, session.stale[row.uid], icon="FILE_REFRESH")
     column = layout.column(align=True)
-    for name in SHOWN:
+    for name in EXPLAINED:
+        if name == "perceived":
+            column.separator()
         split = column.split(factor=0.5, align=True)
         label = split.row()
         label.alignment = "LEFT"
@@ -123,9 +127,10 @@ def _draw_row(layout: bpy.types.UILayout, context: bpy.types.Context, fmqm: FMQM
         split.label(text=f"{scores[name]:.4f}{error}")
     reverse = row_reverse(row)
     if reverse is not None:
-        split = column.split(factor=0.5, align=True)
-        split.label(text="    FMQM Reversed")
-        split.label(text=f"{reverse['FMQM']:.4f}")
+        for judge in Judge:
+            split = column.split(factor=0.5, align=True)
+            split.label(text=f"    {EXPLAINED[judge.column][0]} Reversed")
+            split.label(text=f"{judge.score(reverse):.4f}")
     attribution = row_attribution(row)
     if attribution is not None:
         for label, key in (("Geometry Loss", "geometry_loss"), ("Texture Loss", "texture_loss")):
@@ -159,4 +164,3 @@ def _draw_row(layout: bpy.types.UILayout, context: bpy.types.Context, fmqm: FMQM
 
 
 CLASSES = (FMQM_UL_rows, FMQM_MT_results, FMQM_PT_results)
-assert set(SHOWN) == set(COLUMNS)

@@ -18,8 +18,8 @@ class FMQMDecimate(bpy.types.PropertyGroup):
     """What is searched for, and how the last search went."""
 
     target: FloatProperty(
-        name="Target FMQM",
-        description="The copy scores at least this much against the original",
+        name="Target",
+        description="The copy scores at least this much against the original, by the results' judge",
         default=0.9,
         min=0.01,
         max=1.0,

@@ -3,11 +3,9 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import bpy
-import numpy as np
 from bpy.props import (
     BoolProperty,
     FloatProperty,
@@ -16,16 +14,18 @@ from bpy.props import (
 )
 
 from ...blender.scene.target import Target
+from ...comparison.measurement import Readings
 from ...metric.evaluation import Scores
+from ...metric.perceived import Perceived
 from ...metric.settings import PRESETS, SETTING_NAMES, Settings
 from ...report.record_check import record_fault
-from ...report.records import SHOWN, PairScore, pair_record
+from ...report.records import PERCEIVED, SHOWN, PairScore, pair_record
 from ...report.trust_table import Report
 from .. import stored_text
 
 # What an artist should know of each number: label, and what a low value looks like.
 EXPLAINED = {
-    "FMQM": ("FMQM", "The whole score, 0 to 1: mean over all patches. 1 is the same as the reference"),
+    "FMQM": ("FMQM", "The paper's score, 0 to 1: mean over all patches. 1 is the same as the reference"),
     "geoSSIM": (
         "Shape",
         "geoSSIM: distances to the surface. Low where the surface has moved, shrunk or lost its bumps",
@@ -42,8 +42,14 @@ EXPLAINED = {
         "Color Edges",
         "colorGraSSIM: the steepest color changes. Low where edges in the texture have moved, softened or broken up",
     ),
+    "perceived": ("Perceived", "Whether people would see it, 0 to 1: mean over all patches. 1 is the same"),
+    "shape": ("Shape", "shape: distances to the surface. Low where the surface has moved, shrunk or lost its bumps"),
+    "facing": ("Facing", "facing: directions to the surface. Low where it is bent or faceted, and shades otherwise"),
+    "color": ("Color", "color: colors around a point. Low where colors or contrasts have changed visibly"),
+    "detail": ("Detail", "detail: slopes of the colors. Low where the texture is blurred, moved or broken up"),
+    "perceived_p10": ("Worst Tenth", "A tenth of the patches has a perceived quality below this"),
 }
-assert set(EXPLAINED) == set(SHOWN)
+assert set(EXPLAINED) == {*SHOWN, *PERCEIVED}
 
 
 class FMQMRow(bpy.types.PropertyGroup):
@@ -55,8 +61,7 @@ class FMQMRow(bpy.types.PropertyGroup):
     kind: StringProperty(name="Kind", description="Whether it is an object or a collection")
     reference_kind: StringProperty(name="Reference Kind", description="Whether the reference is one or the other")
     bare_reference: BoolProperty(name="Bare Reference", description="The reference was measured without modifiers")
-    scores: StringProperty(name="Scores", description="The five scores in double precision, as JSON")
-    stderr: StringProperty(name="Standard Errors", description="Of the scores, as JSON; empty for one seed")
+    scores: StringProperty(name="Scores", description="FMQM, perceived and their errors in double precision, as JSON")
     triangles: IntProperty(name="Triangles", description="Triangles of the compared object", min=0)
     share: FloatProperty(
         name="Share", description="Its triangles by those of the reference", min=0.0, subtype="PERCENTAGE"
@@ -69,7 +74,7 @@ class FMQMRow(bpy.types.PropertyGroup):
     error: StringProperty(name="Error", description="Why there is no score")
     space: StringProperty(name="Space", description="Where the two were compared")
     settings: StringProperty(name="Settings", description="Settings of the measurement, as JSON")
-    reverse: StringProperty(name="Reverse", description="Scores of the other direction, as JSON; empty: not measured")
+    reverse: StringProperty(name="Reverse", description="As Scores, of the other direction; empty: not measured")
     attribution: StringProperty(name="Attribution", description="Whose loss it is, as JSON; empty: not measured")
     trust: StringProperty(name="Trust", description="How far to trust the scores: facts with their units, as JSON")
     fingerprint: StringProperty(name="Fingerprint", description="Tells whether what was measured has changed since")
@@ -89,19 +94,32 @@ def row_targets(row: FMQMRow) -> tuple[Target, Target]:
     )
 
 
+def row_readings(row: FMQMRow) -> Readings | None:
+    """Both readings, in double precision; None for a row with an error."""
+    return stored_text.read_readings(row.scores)
+
+
 def row_scores(row: FMQMRow) -> dict[str, float] | None:
-    """The five scores by the names of metric.evaluation.COLUMNS, in double precision; None for a row with an error."""
-    return stored_text.read_columns(row.scores)
+    """All numbers of both readings by the names of EXPLAINED; None for a row with an error."""
+    readings = row_readings(row)
+    return None if readings is None else _numbers(readings.scores, readings.perceived)
 
 
 def row_stderr(row: FMQMRow) -> dict[str, float] | None:
-    """Standard errors of the scores over the seeds; None for one seed."""
-    return stored_text.read_columns(row.stderr)
+    """Standard errors of row_scores over the seeds; None for one seed."""
+    readings = row_readings(row)
+    if readings is None or readings.stderr is None or readings.perceived_stderr is None:
+        return None
+    return _numbers(readings.stderr, readings.perceived_stderr)
 
 
-def row_reverse(row: FMQMRow) -> dict[str, float] | None:
-    """Scores of the other direction, the compared as the reference; None where they were not measured."""
-    return stored_text.read_columns(row.reverse)
+def row_reverse(row: FMQMRow) -> Readings | None:
+    """Readings of the other direction, the compared as the reference; None where they were not measured."""
+    return stored_text.read_readings(row.reverse)
+
+
+def _numbers(scores: Scores, perceived: Perceived) -> dict[str, float]:
+    return {**scores._asdict(), **{column: getattr(perceived, name) for column, name in PERCEIVED.items()}}
 
 
 def row_attribution(row: FMQMRow) -> dict[str, Any] | None:
@@ -112,11 +130,6 @@ def row_attribution(row: FMQMRow) -> dict[str, Any] | None:
 def row_trust(row: FMQMRow) -> Report | None:
     """The trust report of a row; None for a row with an error."""
     return stored_text.read_trust(row.trust)
-
-
-def numbers_text(values: Any) -> str:
-    """Doubles as the text that row_scores reads back bit by bit."""
-    return json.dumps(np.asarray(values, np.float64).tolist())
 
 
 def settings_name(row: FMQMRow) -> str:
@@ -144,9 +157,8 @@ def _settings_that_count(row: FMQMRow) -> dict[str, Any] | None:
 def is_whole(row: FMQMRow) -> bool:
     """Whether all that a row holds can be read; whoever sent the file may have written something else there."""
     readers = (
-        (row.scores, stored_text.read_columns),
-        (row.stderr, stored_text.read_columns),
-        (row.reverse, stored_text.read_columns),
+        (row.scores, stored_text.read_readings),
+        (row.reverse, stored_text.read_readings),
         (row.attribution, stored_text.read_attribution),
         (row.trust, stored_text.read_trust),
         (row.settings, stored_text.read_settings),
@@ -163,22 +175,17 @@ def pair_of(row: FMQMRow) -> PairScore:
     return PairScore(
         reference=reference.label,
         distorted=target.label,
-        scores=_scores(row_scores(row)),
-        stderr=_scores(row_stderr(row)),
+        readings=row_readings(row),
         patches=row.patches or None,
         samples=row.samples or None,
         seconds=stored_text.read_stages(row.stages) or {},
         warnings=tuple(row.warnings.splitlines()),
         error=row.error or None,
         space=row.space or None,
-        reverse=_scores(row_reverse(row)),
+        reverse=row_reverse(row),
         trust=row_trust(row),
         findings={} if attribution is None else {"attribution": attribution},
     )
-
-
-def _scores(columns: dict[str, float] | None) -> Scores | None:
-    return None if columns is None else Scores(**columns)
 
 
 CLASSES = (FMQMRow,)

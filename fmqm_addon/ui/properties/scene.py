@@ -12,6 +12,7 @@ from bpy.props import (
     PointerProperty,
 )
 
+from ...comparison.judge import Judge
 from .decimate import FMQMDecimate
 from .items import FMQMItem, can_be_picked
 from .rows import FMQMRow
@@ -54,6 +55,15 @@ class FMQMScene(bpy.types.PropertyGroup):
     row_index: IntProperty(
         name="Active Result", description="Chosen row of the results", default=0, min=0, update=notify("row_index")
     )
+    judge: EnumProperty(
+        name="Judge",
+        description="Which of the two readings decides: shown in the list, sorted by, aimed at, and the worst places",
+        items=[
+            ("FMQM", "FMQM", "The paper's number"),
+            ("PERCEIVED", "Perceived", "The second reading: whether people would see the difference"),
+        ],
+        update=notify("judge"),
+    )
     look: PointerProperty(name="Look", description="What of the chosen result is shown", type=FMQMLook)
     decimate: PointerProperty(
         name="Decimate", description="Search for the fewest triangles that are good enough", type=FMQMDecimate
@@ -61,6 +71,9 @@ class FMQMScene(bpy.types.PropertyGroup):
 
 
 CLASSES = (FMQMScene,)
+
+
+assert [Judge[item] for item in ("FMQM", "PERCEIVED")] == list(Judge)
 
 
 def register() -> None:

@@ -38,7 +38,7 @@ class FMQMWorstPatch(bpy.types.PropertyGroup):
 
     name: StringProperty(name="Name", description="Number of the patch")
     patch: IntProperty(name="Patch", description="Number of the patch", min=0)
-    score: FloatProperty(name="FMQM", description="Score of the patch", min=0.0, max=1.0)
+    score: FloatProperty(name="Score", description="The judge's score of the patch", min=0.0, max=1.0)
     blame: StringProperty(name="To Blame", description="Feature that falls furthest below its mean over all patches")
     value: FloatProperty(name="Value", description="That feature in this patch", min=0.0, max=1.0)
 
@@ -73,7 +73,7 @@ class FMQMLook(bpy.types.PropertyGroup):
         default=1.0, min=0.05, max=10.0, soft_min=0.2, soft_max=3.0, step=5, precision=2, subtype="FACTOR",
         update=notify("point_size"),
     )  # fmt: skip
-    worst: CollectionProperty(name="Worst Places", description="The patches of the lowest FMQM", type=FMQMWorstPatch)
+    worst: CollectionProperty(name="Worst Places", description="The patches of the lowest scores", type=FMQMWorstPatch)
     worst_index: IntProperty(
         name="Worst Place",
         description="Frames this patch and shows only its points",

@@ -7,10 +7,11 @@ import bpy
 from mathutils import Matrix
 
 from ...blender.display import scene_objects, viewport
+from ...comparison.judge import Judge
 from .. import session
 from ..properties.rows import active_row
 from . import overlay, worst
-from .cloud import build_cloud
+from .cloud import build_cloud, show_all_patches
 from .painted import build_painted, keep_fields
 from .result import UID, look_of, measured_of, measured_row, world_matrix
 from .shells import build_shells
@@ -26,8 +27,7 @@ def follow_row(scene: bpy.types.Scene) -> None:
     """
     look, row = look_of(scene), active_row(scene)
     if row is None or row.uid != look.worst_uid:
-        look.worst.clear()
-        look.worst_uid = ""
+        worst.forget_worst(look)
     uid, _, measured = measured_row(scene)
     builders = {
         scene_objects.CLOUD: build_cloud,
@@ -41,6 +41,21 @@ def follow_row(scene: bpy.types.Scene) -> None:
             build(scene)
     worst.fill_worst(look, measured.comparison.result, uid)
     follow_unit(scene)
+
+
+def follow_judge(scene: bpy.types.Scene) -> None:
+    """The worst places become those of the judge just chosen, and its scores are shown where another's were.
+
+    Raises:
+        FMQMError: as follow_row.
+    """
+    look = look_of(scene)
+    worst.forget_worst(look)
+    if look.layer in [judge.column for judge in Judge]:
+        look.layer = Judge[scene.fmqm.judge].column
+    follow_row(scene)
+    if look.focused:
+        show_all_patches(scene)
 
 
 def move_shown(scene: bpy.types.Scene) -> None:

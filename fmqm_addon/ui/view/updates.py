@@ -39,6 +39,7 @@ def _rebuild_slice(scene: bpy.types.Scene) -> None:
 
 _UPDATES: dict[str, tuple[Callable[[bpy.types.Scene], object], ...]] = {
     "row_index": (shown.follow_row,),
+    "judge": (shown.follow_judge,),
     "layer": (_recolor,),
     "range": (_recolor, slice_plane.draw_slice),
     "place": (shown.move_shown,),

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from ...comparison.judge import Judge
 from ...metric.evaluation import Result
 from ...report.visual import layers
 from ...report.visual.worst import worst_patches
@@ -22,11 +23,17 @@ def choose_worst(look: FMQMLook, index: int) -> None:
         choosing = False
 
 
+def forget_worst(look: FMQMLook) -> None:
+    look.worst.clear()
+    look.worst_uid = ""
+
+
 def fill_worst(look: FMQMLook, result: Result, uid: str) -> None:
+    """Lists the patches that the scene's judge scores lowest, unless they are there."""
     if look.worst_uid == uid and len(look.worst):
         return
     look.worst.clear()
-    for worst in worst_patches(result, WORST_COUNT):
+    for worst in worst_patches(result, WORST_COUNT, Judge[look.id_data.fmqm.judge]):
         item = look.worst.add()
         item.name = f"Patch {worst.patch}"
         item.patch, item.score, item.value = worst.patch, worst.score, worst.value
