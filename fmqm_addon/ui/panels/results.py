@@ -28,7 +28,7 @@ NOT_SEEN = "Normal maps, roughness and lighting are not part of FMQM"
 
 
 class FMQM_UL_rows(bpy.types.UIList):  # noqa: N801
-    """Name and the judge's score, in a wide sidebar its features too; greyed at other settings than the chosen row's."""
+    """Name and the judge's score, in a wide sidebar its features too; grey at other settings than the chosen row's."""
 
     def draw_item(
         self,

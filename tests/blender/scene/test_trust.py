@@ -155,9 +155,9 @@ def test_rows_keep_the_report_and_the_other_direction(pair: list[bpy.types.Objec
         (outcome,) = api.measure(*pair, Settings(samples=8000, patches=40), both=True)
         assert outcome.trust is not None
         assert row_trust(row) == json.loads(json.dumps(trust_dict(outcome.trust)))
-        assert row_reverse(row) == dict(zip(COLUMNS, outcome.reverse, strict=True))
         kept = pair_of(row)
-        assert kept.trust == row_trust(row) and np.array_equal(kept.reverse, outcome.reverse)
+        assert kept.trust == row_trust(row) and kept.reverse == row_reverse(row) is not None
+        assert (kept.reverse.scores, kept.reverse.perceived) == (outcome.reverse, outcome.reverse_perceived)
         wide, narrow = said_at(800), said_at(230)
         assert {"Watertight: no", "Triangles: 968 / 980", "Flipped: 0 % of samples"} <= set(wide)
         assert any(said.startswith("Non-manifold edges") for said in wide)
