@@ -51,7 +51,7 @@ fmqm = bpy.context.scene.fmqm
 fmqm.settings.samples, fmqm.settings.patches = 8000, 40
 bpy.ops.fmqm.find_lods()
 bpy.ops.fmqm.measure()
-report["rows"] = [(row.name, json.loads(row.scores), row.error) for row in fmqm.rows]
+report["rows"] = [(row.name, json.loads(row.scores)["scores"], row.error) for row in fmqm.rows]
 from bl_ext.user_default.fmqm.fmqm_addon import api
 lods = [bpy.data.objects[f"Rock_LOD{level}"] for level in range(2)]
 outcome = api.measure(*lods, api.Settings(samples=8000, patches=40))[0]

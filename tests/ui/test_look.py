@@ -414,6 +414,20 @@ def test_worst_places_are_the_chosen_rows(scene: bpy.types.Scene, measured: sess
     assert not look.focused
 
 
+def test_worst_places_are_the_judges(scene: bpy.types.Scene, measured: session.Measured) -> None:
+    look, result = scene.fmqm.look, measured.comparison.result
+    bpy.ops.fmqm.look()
+    look.worst_index = 2  # a click in the list
+    for judge, column in (("PERCEIVED", "perceived"), ("FMQM", "FMQM")):
+        scene.fmqm.judge = judge
+        lowest = np.sort(result.of_patches(column))[: len(look.worst)]
+        np.testing.assert_allclose([item.score for item in look.worst], lowest, rtol=1e-6)
+        assert look.layer == column and not look.focused and look.worst_index == 0
+    look.layer = "SIDES"
+    scene.fmqm.judge = "PERCEIVED"
+    assert look.layer == "SIDES", "only a score gives way to a score"
+
+
 def test_each_scene_shows_its_own(scene: bpy.types.Scene, measured: session.Measured) -> None:
     show_all()
     mine = [scene_objects.find_object(scene, kind) for kind in SHOWN]

@@ -23,8 +23,12 @@ from tests.blender import scenes
 from tests.blender.script import read_json
 
 BROKEN = ("", "{", "[]", "{}", "7", "null", '"text"', "[1, 2, 3, 4, NaN]", '["a", "b", "c", "d", "e"]', "[" * 100_000)
-NAMES = ("scores", "stderr", "reverse", "attribution", "trust", "settings", "stages")
-FINE = {*((name, "") for name in ("stderr", "reverse", "attribution", "trust", "stages")), ("stages", "{}")}
+NO_SECOND = json.dumps(
+    {**dict.fromkeys(("stderr", "perceived", "perceived_stderr")), "scores": [1.0] * 5, "fmqm_p10": 1.0}
+)
+BROKEN = (*BROKEN, NO_SECOND)
+NAMES = ("scores", "reverse", "attribution", "trust", "settings", "stages")
+FINE = {*((name, "") for name in ("reverse", "attribution", "trust", "stages")), ("stages", "{}")}
 
 
 @pytest.fixture

@@ -109,7 +109,7 @@ def clear() -> None:
     rows = bpy.context.scene.fmqm.rows
     bpy.ops.fmqm.clear()
     REPORT["blocks after"] = blocks()
-    REPORT["rows"] = [(row.name, row.scores, row.error) for row in rows]
+    REPORT["rows"] = [(row.name, json.loads(row.scores)["scores"], row.error) for row in rows]
     REPORT["longest tick"] = session().longest_tick
     (OUT / "report.json").write_text(json.dumps(REPORT))
 

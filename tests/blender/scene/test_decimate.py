@@ -344,6 +344,19 @@ def test_script_makes_a_chain(torus: Path, tmp_path: Path) -> None:
     assert 576 > first > second
 
 
+def test_script_goes_by_the_judge(torus: Path, tmp_path: Path) -> None:
+    report = tmp_path / "out.json"
+    done = decimate(torus, "--judge", "perceived", "--target", 0.8, "--json", report, *SMALL)
+    assert done.returncode == 0, done.stderr
+    document = read_json(report)
+    geometry = document["found"][0]["geometry"]
+    assert document["judge"] == "perceived"
+    assert geometry["best"]["perceived"] >= 0.8 > geometry["below"]["perceived"]
+    both = decimate(torus, "--target", 0.8, "--target-fmqm", 0.8, *SMALL)
+    other = decimate(torus, "--judge", "perceived", "--target-fmqm", 0.8, *SMALL)
+    assert both.returncode == other.returncode == 2 and "--target for --judge perceived" in other.stderr
+
+
 def test_script_says_that_a_target_is_missed(torus: Path, tmp_path: Path) -> None:
     out = tmp_path / "out.glb"
     done = decimate(torus, "--target-fmqm", 0.99, "--max-triangles", 50, "-o", out, "--json", "-", *SMALL)
