@@ -12,6 +12,7 @@ import numpy as np
 
 from ...metric.geometry import Floats
 from .members import hidden_when_instanced, instanced, metaball_family
+from .render_levels import OWN_DATA, differs_in_renders, set_render_levels
 
 
 @dataclass(frozen=True)
@@ -59,10 +60,11 @@ class Shown:
 
 @contextmanager
 def evaluated(objects: Sequence[bpy.types.Object]) -> Iterator[list[Evaluated]]:
-    """The evaluated counterparts of objects, in their order.
+    """The evaluated counterparts of objects, in their order, as renders show them.
 
     Objects that the view layer leaves out (excluded collection, disabled or hidden in viewports) show nothing
-    there; they are evaluated as temporary duplicates in a temporary scene.
+    there, and Blender gives Python no evaluation for renders; these, and objects that renders show otherwise, are
+    evaluated as temporary duplicates in a temporary scene.
     """
     for object_ in objects:
         if object_.mode == "EDIT":
@@ -70,17 +72,19 @@ def evaluated(objects: Sequence[bpy.types.Object]) -> Iterator[list[Evaluated]]:
     depsgraph = bpy.context.evaluated_depsgraph_get()
     depsgraph.update()
     found = [Evaluated(object_, object_.evaluated_get(depsgraph), depsgraph) for object_ in objects]
-    if all(_is_there(each) for each in found):
+    now = bpy.context.scene
+    absent = [index for index, each in enumerate(found) if not _is_there(each) or differs_in_renders(each.original)]
+    if not absent:
         yield found
         return
-    now = bpy.context.scene
     scene = bpy.data.scenes.new("FMQM evaluation")
+    scene.render.use_simplify = now.render.use_simplify
+    scene.render.simplify_subdivision = now.render.simplify_subdivision_render
     made: list[bpy.types.Object] = []
     try:
         scene.frame_current, scene.frame_subframe = now.frame_current, now.frame_subframe
-        duplicates = {
-            index: _duplicate(each.original, scene, made) for index, each in enumerate(found) if not _is_there(each)
-        }
+        duplicates = {index: _duplicate(found[index].original, scene, made) for index in absent}
+        set_render_levels(made)
         view_layer = scene.view_layers[0]
         view_layer.update()
         aside = view_layer.depsgraph
@@ -89,8 +93,10 @@ def evaluated(objects: Sequence[bpy.types.Object]) -> Iterator[list[Evaluated]]:
             for index, each in enumerate(found)
         ]
     finally:
+        own = {each.data for each in made if each.data is not None and each.data.name.startswith(OWN_DATA)}
         for duplicate in made:
             bpy.data.objects.remove(duplicate)
+        bpy.data.batch_remove(own)
         bpy.data.scenes.remove(scene)
 
 

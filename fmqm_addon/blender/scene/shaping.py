@@ -33,7 +33,9 @@ def shaping_images(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Image]
         for user in users:
             if isinstance(user, _FOLLOWED) and getattr(user, "data", None) != block:
                 used[user].append(block)
-    waiting = [each for each in objects if any(modifier.show_viewport for modifier in each.modifiers)]
+    waiting = [
+        each for each in objects if any(modifier.show_viewport or modifier.show_render for modifier in each.modifiers)
+    ]
     seen = set(waiting)
     while waiting:
         for block in used[waiting.pop()]:

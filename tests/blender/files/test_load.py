@@ -186,7 +186,8 @@ def shop(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for place, name in enumerate(NAMES):
         object_ = scenes.cube(name, collection=excluded if name == "Excluded" else None)
         object_.location.x = 10 * place
-        object_.modifiers.new("Subdivision", "SUBSURF").levels = 1
+        smooth = object_.modifiers.new("Subdivision", "SUBSURF")
+        smooth.levels = smooth.render_levels = 1
     bpy.context.view_layer.layer_collection.children["Left out"].exclude = True
     bpy.data.objects["Hidden"].hide_viewport = True
     bpy.data.objects["Unrendered"].hide_render = True
@@ -259,10 +260,10 @@ def test_objects_are_joined_in_the_order_of_their_names(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "error", "words"),
     [
-        ("Nobody", FileError, "no object named Nobody"),
-        ("plain", FileError, "no object named plain"),
+        ("Nobody", FileError, "no object or collection named Nobody"),
+        ("plain", FileError, "no object or collection named plain"),
         ("Camera", MeshError, "camera"),
-        ("Empty", MeshError, "empty"),
+        ("Empty", MeshError, "no mesh in it"),
     ],
 )
 def test_no_such_object(shop: Path, name: str, error: type[FMQMError], words: str) -> None:

@@ -28,7 +28,8 @@ GIVEN = Reading(texture=Texture(scenes.noise()))
 def subdivided(name: str = "Cube", **options: object) -> bpy.types.Object:
     """A cube that has 48 triangles once its modifier is applied, 12 without."""
     object_ = scenes.cube(name, **options)
-    object_.modifiers.new("Subdivision", "SUBSURF").levels = 1
+    smooth = object_.modifiers.new("Subdivision", "SUBSURF")
+    smooth.levels = smooth.render_levels = 1
     return object_
 
 
@@ -64,9 +65,9 @@ def test_modifiers_are_applied() -> None:
     assert len(mesh_arrays([subdivided()], "asset").triangles) == 48
 
 
-def test_modifier_that_is_off_in_viewports_is_not() -> None:
+def test_modifier_that_is_off_in_renders_is_not() -> None:
     object_ = subdivided()
-    object_.modifiers[0].show_viewport = False
+    object_.modifiers[0].show_render = False
     assert len(mesh_arrays([object_], "asset").triangles) == 12
 
 

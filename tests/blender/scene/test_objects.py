@@ -99,6 +99,7 @@ def balls() -> bpy.types.Object:
     bpy.ops.object.metaball_add(location=(3, 2, 1))
     bpy.context.object.name = "Ball.001"
     bpy.context.object.parent = mother  # moved alone, the two would flow together otherwise
+    mother.data.render_resolution = mother.data.resolution
     mother.update_tag()  # Blender does not notice that a name makes them flow together
     return mother
 
@@ -481,7 +482,8 @@ def test_excluding_a_collection_does_not_hide_its_instances() -> None:
 def test_linked_duplicates_in_edit_mode_have_their_own_modifiers() -> None:
     first, second = scenes.cube("First"), scenes.cube("Second")
     second.data = first.data
-    first.modifiers.new("Subdivision", "SUBSURF").levels = 1
+    smooth = first.modifiers.new("Subdivision", "SUBSURF")
+    smooth.levels = smooth.render_levels = 1
     bpy.context.view_layer.objects.active = first
     bpy.ops.object.mode_set(mode="EDIT")
     assert len(mesh_arrays([first, second], "asset").triangles) == 48 + 12
