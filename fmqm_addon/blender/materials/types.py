@@ -13,11 +13,12 @@ from ..access import ANYWHERE, Access
 from .image_headers import DEFAULT_LIMITS, ImageLimits
 
 MAX_BAKE = 16384  # pixels a side
+MAX_FRAME = 1_048_574  # in either direction
 
 
 @dataclass(frozen=True)
 class Reading:
-    """How an asset's looks are read.
+    """How an asset is read: its looks, and which of its parts in which pose.
 
     Attributes:
         texture: replaces everything that the materials say.
@@ -25,9 +26,12 @@ class Reading:
         stand_in: a missing base-color image is shown in magenta, as Blender shows it, instead of being an error.
         limits: of the images.
         access: which files the asset may name.
+        include, exclude: patterns of names, as of files (`*_hull?`), whatever their case: of the objects that are
+            measured, of what they hang from or of their collections. No include takes all.
+        frame: at which a file's first clip, or a .blend, is measured; None: as it stands without a clip, or was saved.
 
     Raises:
-        SettingsError: bake is not between 0 and MAX_BAKE.
+        SettingsError: bake is not between 0 and MAX_BAKE, or frame not one that Blender has.
     """
 
     texture: Texture | None = None
@@ -35,10 +39,15 @@ class Reading:
     stand_in: bool = False
     limits: ImageLimits = DEFAULT_LIMITS
     access: Access = ANYWHERE
+    include: tuple[str, ...] = ()
+    exclude: tuple[str, ...] = ()
+    frame: int | None = None
 
     def __post_init__(self) -> None:
         if not 0 <= self.bake <= MAX_BAKE:
             raise SettingsError(f"bake is {self.bake}; it must be between 0 and {MAX_BAKE}")
+        if self.frame is not None and abs(self.frame) > MAX_FRAME:
+            raise SettingsError(f"frame is {self.frame}; it must be between {-MAX_FRAME} and {MAX_FRAME}")
 
     @property
     def facts(self) -> tuple[Fact, ...]:

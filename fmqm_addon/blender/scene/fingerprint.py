@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 from zlib import crc32
@@ -21,14 +21,14 @@ from numpy.typing import NDArray
 
 from ...metric.geometry import Floats
 from ..materials.image_files import image_paths
-from .members import collection_members, instanced, metaball_family
+from .members import collection_members, instanced, instances_of, metaball_family
 from .target import Target
 
 _MOST_PAINTED = 2**24  # values of an image that are looked through, 2048 x 2048 pixels; more would hold up painting
 
 _VALUES = {"BOOLEAN", "INT", "FLOAT", "STRING", "ENUM"}
 _UNSEEN = ("active", "bl_", "execution_time", "open_", "select", "show_", "texspace", "use_pin")  # beginnings of names
-_SEEN_ALL_THE_SAME = {"show_viewport"}  # of modifiers
+_SEEN_ALL_THE_SAME = {"show_render", "show_viewport"}  # of modifiers
 # By type: what neither shapes nor colors anything, or follows from the rest.
 _LEFT_OUT: dict[str, set[str]] = {
     "ID": {prop.identifier for prop in bpy.types.ID.bl_rna.properties} | {"animation_data", "grease_pencil"},
@@ -66,33 +66,20 @@ def fingerprint(target: Target, place_counts: bool) -> str:
     """
     if target.is_gone():
         return ""
-    walk = _Walk()
+    walk, root = _Walk(), target.find()
     for object_ in target.members():
         matrix = np.array(object_.matrix_world, np.float32)
         walk.add_array(matrix if place_counts else matrix[:3, :3])
-        walk.add_object(object_, target.bare)
+        if isinstance(root, bpy.types.Object) and object_ != root:  # a part that has moved makes another whole
+            walk.add_steps(np.array(root.matrix_world.inverted_safe() @ object_.matrix_world))
+        walk.add_object(object_, target.bare and object_ == root)
     return walk.digest.hexdigest()
 
 
 def in_edit_mode(target: Target) -> bool:
     """Whether something of an asset is being edited: what it will be is not known before that ends."""
     objects = target.members()
-    return any(getattr(object_.data, "is_editmode", False) for object_ in (*objects, *_instances_of(objects)))
-
-
-def _instances_of(objects: Sequence[bpy.types.Object]) -> list[bpy.types.Object]:
-    """The objects of the collections that some instance, and of those that these instance, each once."""
-    found: dict[str, bpy.types.Object] = {}
-    seen: set[str] = set()
-    waiting = list(objects)
-    while waiting:
-        collection = instanced(waiting.pop())
-        if collection is not None and collection.name_full not in seen:
-            seen.add(collection.name_full)
-            members = collection_members(collection)
-            found.update((member.name_full, member) for member in members)
-            waiting += members
-    return list(found.values())
+    return any(getattr(object_.data, "is_editmode", False) for object_ in (*objects, *instances_of(objects)))
 
 
 class _Walk:
@@ -152,11 +139,11 @@ class _Walk:
                     self.add([(each.group, each.weight) for v in mesh.vertices for each in (*v.groups, _NEXT)])
         elif object_.type == "META":
             for ball in metaball_family(object_):
-                self._add_steps(np.array(object_.matrix_world.inverted_safe() @ ball.matrix_world))
+                self.add_steps(np.array(object_.matrix_world.inverted_safe() @ ball.matrix_world))
                 self._add_pointer(ball.data)
         elif object_.type == "ARMATURE":
             self.add(data.pose_position)
-            self._add_steps(np.array([bone.matrix for bone in object_.pose.bones]))
+            self.add_steps(np.array([bone.matrix for bone in object_.pose.bones]))
         elif isinstance(data, bpy.types.Curve):
             self._add_pointer(data)
             for spline in data.splines:
@@ -210,7 +197,7 @@ class _Walk:
             points.foreach_get(key, values)
             self.add_array(values)
 
-    def _add_steps(self, values: Floats) -> None:
+    def add_steps(self, values: Floats) -> None:
         """Numbers up to rounding, which differs where things are moved together."""
         values = np.nan_to_num(values)
         largest = np.abs(values).max(initial=0.0)
@@ -231,7 +218,7 @@ class _Walk:
             self.add(None)
         elif isinstance(block, bpy.types.Object):
             if self._owner is not None:
-                self._add_steps(np.array(self._owner.matrix_world.inverted_safe() @ block.matrix_world))
+                self.add_steps(np.array(self._owner.matrix_world.inverted_safe() @ block.matrix_world))
             self.add_object(block)
         elif isinstance(block, bpy.types.Collection):
             self._add_collection(block)

@@ -30,13 +30,18 @@ def is_measured(object_: bpy.types.Object) -> bool:
     )
 
 
+def shows_surface(object_: bpy.types.Object) -> bool:
+    """Whether an object, or one below it, may show a surface."""
+    return is_measured(object_) or any(map(is_measured, object_.children_recursive))
+
+
 def check_object(object_: bpy.types.Object) -> None:
     """Refuses what cannot be measured by its name.
 
     Raises:
-        MeshError: the object shows no surface, or its surface is held by another.
+        MeshError: the object shows no surface, nor those below it, or its surface is held by another.
     """
-    if not is_measured(object_):
+    if object_.type != "EMPTY" and not shows_surface(object_):
         kind = object_.type.lower().replace("_", " ")
         raise MeshError(f"{object_.name}: the object is of type {kind}; {WANTED}")
     mother = metaball_mother(object_) if object_.type == "META" else object_
@@ -78,9 +83,29 @@ def collection_members(collection: bpy.types.Collection) -> list[bpy.types.Objec
 
 
 def family_members(object_: bpy.types.Object) -> list[bpy.types.Object]:
-    """What an object and those below it show, by name; hidden ones only if there are no others."""
-    family = [object_, *object_.children_recursive]
-    return _members(member for member in family if not member.hide_render) or _members(family)
+    """What an object and those below it show, by name: the object itself, hidden or not; those that are hidden only
+    if it is, too, and there are no others."""
+    below = object_.children_recursive
+    visible = [member for member in below if not member.hide_render]
+    own = [object_] if is_measured(object_) else []
+    is_hidden = object_.hide_render or not own
+    found = own + _members(below if is_hidden and not _members(visible) else visible)
+    return sorted(found, key=lambda each: each.name_full)
+
+
+def instances_of(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
+    """The objects of the collections that some instance, and of those that these instance, each once."""
+    found: dict[str, bpy.types.Object] = {}
+    seen: set[str] = set()
+    waiting = list(objects)
+    while waiting:
+        collection = instanced(waiting.pop())
+        if collection is not None and collection.name_full not in seen:
+            seen.add(collection.name_full)
+            members = collection_members(collection)
+            found.update((member.name_full, member) for member in members)
+            waiting += members
+    return [found[name] for name in sorted(found)]
 
 
 def scene_members() -> list[bpy.types.Object]:

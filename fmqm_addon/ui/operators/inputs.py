@@ -8,13 +8,28 @@ from typing import ClassVar
 
 import bpy
 
-from ...blender.scene.lods import find_lods
+from ...blender.scene.lods import are_kin, find_lods, lineage
 from ..properties.items import is_asset, kept
 from ..properties.scene import FMQMScene
 
 
 def _selected_assets(context: bpy.types.Context) -> list[bpy.types.Object]:
     return sorted((o for o in context.selected_objects if is_asset(o)), key=lambda o: o.name_full)
+
+
+def _apart_from(
+    reference: bpy.types.Object | bpy.types.Collection | None, assets: Sequence[bpy.types.Object]
+) -> list[bpy.types.Object]:
+    """Those that are no part of the reference, which is no part of theirs, nor of each other: these are measured with
+    what they hang from, and imports leave all of it selected."""
+    chosen = set(assets)
+    return [
+        asset
+        for asset in assets
+        if asset != reference
+        and not are_kin(asset, reference)
+        and not any(above in chosen and are_kin(asset, above) for above in lineage(asset.parent))
+    ]
 
 
 def set_compared(fmqm: FMQMScene, assets: Sequence[bpy.types.Object | bpy.types.Collection]) -> None:
@@ -65,8 +80,15 @@ class FMQM_OT_use_selection(bpy.types.Operator):  # noqa: N801
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         fmqm, active = context.scene.fmqm, context.active_object
+        compared = _apart_from(active, _selected_assets(context))
+        if not compared:
+            self.report(
+                {"WARNING"},
+                f"What is selected is measured with {active.name}, as one hangs from the other; select another asset",
+            )
+            return {"CANCELLED"}
         set_reference(fmqm, active)
-        set_compared(fmqm, [o for o in _selected_assets(context) if o != active])
+        set_compared(fmqm, compared)
         return {"FINISHED"}
 
 
@@ -74,8 +96,8 @@ class FMQM_OT_find_lods(bpy.types.Operator):  # noqa: N801
     bl_idname = "fmqm.find_lods"
     bl_label = "Find LODs"
     bl_description = (
-        "Find the levels of detail of the active object by their names (Rock_LOD0, LOD1_Rock, Rock.LOD2), "
-        "an FBX LOD group or its collection. The finest is the reference"
+        "Find the levels of detail of the active object by names of objects, empties or collections (Rock_LOD0, "
+        "LOD1_Rock, x00_Rock, Rock_L0, Rock_high), an FBX LOD group or its collection. The finest is the reference"
     )
     bl_options: ClassVar = {"REGISTER", "UNDO"}
 
@@ -136,9 +158,9 @@ class FMQM_OT_add_selected(bpy.types.Operator):  # noqa: N801
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         fmqm = context.scene.fmqm
-        there = {item.object for item in fmqm.compared} | {reference_of(fmqm)}
-        for object_ in _selected_assets(context):
-            if object_ not in there:
+        there = {item.object for item in fmqm.compared}
+        for object_ in _apart_from(reference_of(fmqm), _selected_assets(context)):
+            if object_ not in there and not any(are_kin(object_, other) for other in there):
                 _add_compared(fmqm, object_)
         fmqm.compared_index = max(0, len(fmqm.compared) - 1)
         return {"FINISHED"}

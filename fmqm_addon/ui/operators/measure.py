@@ -10,6 +10,8 @@ from typing import ClassVar
 import bpy
 import numpy as np
 
+from ...blender.materials.types import Reading
+from ...blender.scene.lods import are_kin
 from ...blender.scene.measure import Outcome, measuring
 from ...blender.scene.target import target_of
 from ...metric.errors import FMQMError
@@ -19,7 +21,7 @@ from ..modal import SteppedOperator
 from ..properties.items import item_target
 from ..properties.rows import row_targets
 from ..properties.scene import FMQMScene
-from ..properties.settings import pair_options
+from ..properties.settings import pair_options, patterns_of
 from ..view.shown import forget_removed
 from .inputs import reference_of
 
@@ -37,6 +39,9 @@ def why_not(fmqm: FMQMScene) -> str:
         return "Add an object to compare with the reference"
     if reference in compared and not fmqm.bare_reference:
         return f"{reference.name} is the reference and in the list too; remove it there, or use Own Modifiers"
+    part = next((target for target in compared if are_kin(target, reference)), None)
+    if part is not None:
+        return f"{part.name} is measured with {reference.name}, as one hangs from the other; remove it from the list"
     if fmqm.bare_reference and (fmqm.reference_kind != "OBJECT" or reference.type != "MESH"):
         return "Without Modifiers needs a single mesh object as the reference"
     return ""
@@ -64,11 +69,14 @@ class FMQM_OT_measure(SteppedOperator, bpy.types.Operator):  # noqa: N801
             return False
         compared = [target_of(target) for item in fmqm.compared if (target := item_target(item)) is not None]
         self._scene = context.scene.name_full
-        self._settings_text = json.dumps(options.as_dict())
+        settings = fmqm.settings
+        patterns = {name: text for name in ("include", "exclude") if (text := getattr(settings, name).strip())}
+        self._settings_text = json.dumps(options.as_dict() | patterns)
         self.stepper = measuring(
             target_of(reference_of(fmqm), fmqm.bare_reference),
             list(dict.fromkeys(compared)),
             options,
+            Reading(include=patterns_of(settings.include), exclude=patterns_of(settings.exclude)),
         )
         return True
 

@@ -39,6 +39,9 @@ class FMQM_PT_settings(Sidebar, bpy.types.Panel):  # noqa: N801
         column.prop(settings, "both")
         column.prop(settings, "attribution")
         column = layout.column(align=True)
+        column.prop(settings, "include")
+        column.prop(settings, "exclude")
+        column = layout.column(align=True)
         column.prop(settings, "seed")
         column.prop(settings, "repeats")
 

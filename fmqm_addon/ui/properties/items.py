@@ -14,8 +14,8 @@ from ...blender.scene.members import is_measured
 
 
 def is_asset(object_: bpy.types.Object) -> bool:
-    """Whether an object can be measured: it may show a surface, or it is an empty and stands for what hangs from it."""
-    return object_.type == "EMPTY" or is_measured(object_)
+    """Whether an object can be measured: it may show a surface, or it stands for what hangs from it. Cheap."""
+    return object_.type in {"EMPTY", "ARMATURE"} or is_measured(object_)
 
 
 def can_be_picked(_: Any, object_: bpy.types.Object) -> bool:
@@ -27,7 +27,7 @@ class FMQMItem(bpy.types.PropertyGroup):
 
     object: PointerProperty(
         name="Object",
-        description="Mesh, curve, surface, text or metaball, or an empty, below which all counts as one object",
+        description="Mesh, curve, surface, text, metaball, empty or armature; what hangs from it counts with it",
         type=bpy.types.Object,
         poll=can_be_picked,
     )

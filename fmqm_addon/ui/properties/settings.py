@@ -13,6 +13,7 @@ from bpy.props import (
     EnumProperty,
     FloatProperty,
     IntProperty,
+    StringProperty,
 )
 
 from ...comparison.pair import PairOptions
@@ -137,13 +138,23 @@ class FMQMSettings(bpy.types.PropertyGroup):
     match_scale: BoolProperty(**_about("match_scale", PairOptions))
     both: BoolProperty(**_about("both", PairOptions, name="Both Directions"))
     attribution: BoolProperty(**_about("attribution", PairOptions))
+    include: StringProperty(
+        name="Include",
+        description="Only objects with such names, or in empties or collections with them: patterns, as *_body, "
+        "separated by commas. Empty for all",
+    )
+    exclude: StringProperty(
+        name="Exclude",
+        description="Leave out objects with such names, or in empties or collections with them: patterns, as "
+        "*_helper, separated by commas",
+    )
 
 
 # In the order in which operator presets save them; space and seed are the scene's, not a preset's.
 PRESET_PROPERTIES = tuple(
     name
     for name in FMQMSettings.__annotations__
-    if name not in {"preset", "seed", "space", "match_scale", "both", "attribution"}
+    if name not in {"preset", "seed", "space", "match_scale", "both", "attribution", "include", "exclude"}
 )
 _PAPER: dict[str, Any] = {
     **{name: getattr(Settings(), name) for name in SETTING_NAMES if name not in {"seed", "scored_patches"}},
@@ -156,6 +167,11 @@ _PRESET_VALUES: dict[str, dict[str, Any]] = {
     "FAST": {**_PAPER, "score_all": False, "scored_patches": FAST_SCORED_PATCHES},
 }
 assert {space.upper() for space in info_of(PairOptions, "space").choices} == {"AUTO", "WORLD", "LOCAL"}
+
+
+def patterns_of(text: str) -> tuple[str, ...]:
+    """The patterns of names in a text, which commas separate."""
+    return tuple(filter(None, map(str.strip, text.split(","))))
 
 
 def plain(value: Any) -> Any:
