@@ -39,12 +39,14 @@ def measure(
     both: bool = False,
     attribution: bool = False,
     bake: int = Reading.bake,
+    include: Iterable[str] = (),
+    exclude: Iterable[str] = (),
 ) -> list[Outcome]:
     """Scores of objects or collections against a reference.
 
     Args:
-        reference, distorted: mesh, curve, surface, text or metaball objects, with their instances; empties, which
-            stand for all below them; collections. Hidden or not.
+        reference, distorted: objects, which stand for what hangs from them, with their instances; collections.
+            Hidden or not. Of levels of detail in one the finest counts, and hulls for collisions do not.
         settings: the paper's if None; `Settings(**PRESETS["fast"])` for a quick look.
         space: "auto", "world" or "local". match_scale: undo a factor between units.
         repeats: measure with so many seeds; scores become means.
@@ -53,6 +55,8 @@ def measure(
         both: score the other direction too: `outcome.reverse` and `outcome.reverse_perceived`.
         attribution: score geometry and texture apart too: `outcome.attribution`, whose loss it is.
         bake: side in pixels of the images onto which materials are baked that cannot be read; 0 forbids it.
+        include, exclude: patterns of names (`*_body`): of the objects that count, of what they hang from or of their
+            collections. No include takes all.
 
     Returns:
         One outcome per distorted asset, in their order; `outcome.scores` are Scores, a named tuple in the order
@@ -77,6 +81,7 @@ def measure(
         both=both,
         attribution=attribution,
     )
+    reading = Reading(bake=bake, include=tuple(include), exclude=tuple(exclude))
     reference_target = target_of(reference, bare=reference_without_modifiers)
     targets = [target_of(asset) for asset in assets]
-    return measuring(reference_target, targets, options, Reading(bake=bake)).run()
+    return measuring(reference_target, targets, options, reading).run()

@@ -49,6 +49,8 @@ class BatchOptions:
             ("max_image_bytes", reading.limits.decoded, DEFAULT_LIMITS.decoded),
         ):
             extra[name] = None if value == default else value
+        extra |= {"frame": reading.frame, "include": ", ".join(reading.include) or None}
+        extra["exclude"] = ", ".join(reading.exclude) or None
         given = {name: value for name, value in extra.items() if value is not None and value is not False}
         return pair.as_dict() | given
 

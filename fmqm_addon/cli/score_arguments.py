@@ -100,6 +100,15 @@ def build_parser(program: str) -> OneLineParser:
         help=f"largest size of a decoded image (default: {DEFAULT_LIMITS.decoded})",
     )
 
+    reading.add_argument(
+        "--frame", type=int, metavar="N",
+        help="measure each file at frame N of its first clip (default: .blend files as saved, others without a clip)",
+    )  # fmt: skip
+    for flag, what in (("include", "measure only"), ("exclude", "leave out")):
+        reading.add_argument(
+            f"--{flag}", metavar="PATTERN", action="append", default=[],
+            help=f"{what} objects with such names (*_body), or in empties or collections with them; may be repeated",
+        )  # fmt: skip
     add_access(reading)
 
     output = parser.add_argument_group("output")
@@ -140,6 +149,9 @@ def options_of(args: argparse.Namespace) -> BatchOptions:
         stand_in=bool(args.bake),
         limits=ImageLimits(args.max_image_side or DEFAULT_LIMITS.side, args.max_image_bytes or DEFAULT_LIMITS.decoded),
         access=Access(args.untrusted, args.asset_root or ""),
+        include=tuple(args.include),
+        exclude=tuple(args.exclude),
+        frame=args.frame,
     )
     pair = PairOptions(settings=settings_of(args), **given)
     judge = args.judge or Judge.FMQM

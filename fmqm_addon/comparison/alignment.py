@@ -21,6 +21,7 @@ import numpy as np
 from ..metric.errors import MeshError
 from ..metric.geometry import Floats, cross
 from ..metric.surface import MeshArrays
+from .pose import Pose
 
 SPACES = ("auto", "world", "local")
 SPACE_LABELS = {"world": "world", "location": "world without location", "local": "local"}
@@ -49,10 +50,12 @@ class AssetMesh:
     Attributes:
         mesh: positions in the asset's own frame.
         origin: (4, 4) float64, from that frame to the world.
+        pose: in which it stood.
     """
 
     mesh: MeshArrays
     origin: Floats
+    pose: Pose = Pose()
 
     def world(self) -> MeshArrays:
         """The mesh in its world."""

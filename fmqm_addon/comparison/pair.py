@@ -7,7 +7,7 @@ The button, the Python API and the scripts score their pairs with this.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ..metric.errors import SettingsError
@@ -17,6 +17,7 @@ from ..metric.surface import QueryBuilder, Surface
 from .alignment import SPACES, Alignment, AssetMesh, align
 from .attribution import Attribution, attribute
 from .measurement import Comparison, Measurement, Readings
+from .pose import pose_warnings
 from .surface_facts import Fact
 
 
@@ -118,8 +119,11 @@ def _comparing_pair(
     known: Sequence[Fact],
 ) -> Work[PairResult]:
     alignment = align(reference, compared, options.space, options.match_scale)
+    posed = pose_warnings(reference.mesh.name, reference.pose, compared.mesh.name, compared.pose)
+    alignment = replace(alignment, warnings=(*alignment.warnings, *posed))
     share = 1 / (1 + options.both + 2 * options.attribution)  # attribution makes two comparisons
-    comparing = measurement.compare(alignment.mesh, (*_alignment_facts(alignment), *known))
+    placed = (*_alignment_facts(alignment), *_pose_facts(reference, compared))
+    comparing = measurement.compare(alignment.mesh, (*placed, *known))
     comparison = yield from as_part(comparing, 0.0, share)
     reverse, attribution = None, None
     if options.both:
@@ -135,4 +139,12 @@ def _alignment_facts(alignment: Alignment) -> tuple[Fact, ...]:
         Fact("space", alignment.label, "where the two were compared"),
         Fact("size_divided_by", alignment.factor, "factor between units"),
         Fact("boxes_apart", alignment.misfit, "share of the reference's box diagonal"),
+    )
+
+
+def _pose_facts(reference: AssetMesh, compared: AssetMesh) -> tuple[Fact, ...]:
+    unit = "frame and clip, or rest: without a clip"
+    return (
+        Fact("pose_of_reference", str(reference.pose), unit),
+        Fact("pose_of_distorted", str(compared.pose), unit),
     )

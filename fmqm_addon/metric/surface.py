@@ -32,7 +32,8 @@ class MeshArrays:
             coordinates, vertex colors (linear light). What they mean, each material knows.
         material: (T,) integers into materials.
         materials: what the triangles look like.
-        warnings: what the adapter had to leave out or assume.
+        warnings: what the adapter had to leave out or assume, so that a score may mislead. notes: what it did that
+            misleads nobody.
     """
 
     name: str
@@ -42,6 +43,7 @@ class MeshArrays:
     material: NDArray[Any]
     materials: tuple[Material, ...]
     warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 def join_meshes(parts: Sequence[MeshArrays], name: str) -> MeshArrays:
@@ -69,6 +71,7 @@ def join_meshes(parts: Sequence[MeshArrays], name: str) -> MeshArrays:
         ),
         materials=tuple(materials.values()),
         warnings=tuple(dict.fromkeys(warning for part in parts for warning in part.warnings)),
+        notes=tuple(dict.fromkeys(note for part in parts for note in part.notes)),
     )
 
 

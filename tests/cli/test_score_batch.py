@@ -341,6 +341,39 @@ def test_lod_chains_of_a_file(assets: Path, tmp_path: Path) -> None:
     assert done.returncode == 1 and "ref.obj: no names in it tell levels" in done.stderr
 
 
+def test_parts_and_poses_are_chosen(tmp_path: Path) -> None:
+    """--include and --exclude reach workers and records; --frame is in the trust report."""
+    import bpy
+
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    for name in ("Rock_LOD0", "Rock_LOD1", "UCX_Rock"):
+        bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=1 if name == "Rock_LOD1" else 3)
+        bpy.context.object.name = name
+    rock = bpy.data.objects["Rock_LOD1"]
+    for frame, size in ((1, 1.0), (9, 2.0)):
+        rock.scale = (size,) * 3
+        rock.keyframe_insert("scale", frame=frame)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "rock.blend"))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+
+    def pair(*flags: str) -> dict[str, Any]:
+        done = score("rock.blend", "rock.blend:Rock_LOD1", *TINY, *flags, "--json", "j", "--quiet", cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        answer = read_json(tmp_path / "j")
+        assert answer["pairs"][0]["error"] is None
+        return answer["pairs"][0]
+
+    plain = pair()
+    assert plain["FMQM"] < 1 and plain["trust"]["pair"]["pose_of_distorted"]["value"].startswith("frame 1 of ")
+    chosen = pair("--include", "*_lod1", "--include", "nobody", "--jobs", "1")
+    assert chosen["FMQM"] == 1
+    assert pair("--exclude", "*_LOD0", "--exclude", "UCX*")["FMQM"] == 1
+    assert pair("--frame", "9")["trust"]["pair"]["pose_of_distorted"]["value"].startswith("frame 9 of ")
+    done = score("rock.blend", "rock.blend", *TINY, "--include", "nobody", cwd=tmp_path)
+    assert done.returncode == 1 and "the patterns leave nothing" in done.stderr
+    assert score("a.obj", "b.obj", "--frame", "9999999").returncode == 2
+
+
 MISSING = ("none.csv: cannot be read", "no file matches")  # files, which are no wrong arguments
 
 

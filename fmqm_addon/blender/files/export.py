@@ -18,11 +18,12 @@ from ...metric.errors import FileError, FMQMError, MeshError, SettingsError
 from ...metric.surface import MeshArrays
 from ..materials.types import Reading
 from ..scene.decimate import add_modifiers, scene_reader
-from ..scene.members import instanced, scene_members
+from ..scene.members import instanced
 from ..scene.mesh_arrays import AS_FOUND
+from ..scene.parts import parts_of
 from .asset_path import split_spec
 from .flatten import ancestors, flatten_objects
-from .load import last_line, load_mesh, open_file
+from .load import last_line, load_mesh, named, open_file
 from .loaded import mute_imports
 
 NOT_COLOR = "Non-Color"
@@ -38,9 +39,7 @@ def open_asset(spec: str, reading: Reading = AS_FOUND) -> list[bpy.types.Object]
     """
     path, name = split_spec(spec)
     open_file(path, reading)
-    if name and name not in bpy.data.objects:
-        raise FileError(f"{path}: no object named {name} in it")
-    objects = [bpy.data.objects[name]] if name else scene_members()
+    objects = parts_of(named(name, path) if name else None, reading).objects
     if not any(object_.type == "MESH" for object_ in objects):
         if any(instanced(object_) for object_ in objects):
             raise MeshError(f"{spec}: it shows only instances; make them real (Object > Apply > Make Instances Real)")
@@ -195,7 +194,7 @@ def _export(
             warnings = (f"{path}: it holds the pose as it stands, no skeleton, shape keys or animation; a .blend does",)
         objects = flatten_objects(objects, alone)
     elif alone:
-        _leave_only(objects[0])
+        _leave_only(objects)
     with own_folder() as images:
         if suffix in _NAMING_IMAGES:
             _write_images(objects, written.parent if suffix == ".obj" else images, written.stem)
@@ -262,32 +261,33 @@ def _save_blend(path: str) -> None:
     bpy.ops.wm.save_as_mainfile(filepath=path, copy=True, relative_remap=False)
 
 
-def _leave_only(object_: bpy.types.Object) -> None:
-    """Only this object stays in the session's scene, where it is and shown; what it uses stays in the session.
+def _leave_only(objects: Sequence[bpy.types.Object]) -> None:
+    """Only these objects stay in the session's scene, where they are and shown; what they use stays in the session.
 
-    Collections are taken out whole, as its modifiers may use one of them.
+    Collections are taken out whole, as modifiers may use one of them.
     """
     scene = bpy.context.scene
-    if object_ not in scene.collection.objects[:]:
-        scene.collection.objects.link(object_)
-    object_.hide_render = False
+    for object_ in objects:
+        if object_ not in scene.collection.objects[:]:
+            scene.collection.objects.link(object_)
+        object_.hide_render = False
     for other_scene in list(bpy.data.scenes):
         if other_scene != scene:
             bpy.data.scenes.remove(other_scene)
     bpy.context.view_layer.update()
-    _keep_used(object_)
+    _keep_used(objects)
     for other in list(scene.collection.objects):
-        if other != object_:
+        if other not in objects:
             scene.collection.objects.unlink(other)
     for collection in list(scene.collection.children):
         scene.collection.children.unlink(collection)
     bpy.context.view_layer.update()
 
 
-def _keep_used(object_: bpy.types.Object) -> None:
+def _keep_used(objects: Sequence[bpy.types.Object]) -> None:
     """Modifiers, constraints and drivers do not count as users of objects: files would be saved without these."""
     users = bpy.data.user_map()
-    reached: set[bpy.types.ID] = {object_}
+    reached: set[bpy.types.ID] = set(objects)
     grown = True
     while grown:
         found = {block for block, by in users.items() if by & reached and not isinstance(block, bpy.types.Scene)}

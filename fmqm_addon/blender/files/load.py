@@ -7,7 +7,7 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stderr
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from io import StringIO
 from pathlib import Path
 
@@ -20,10 +20,13 @@ from ..access import check_asset
 from ..materials.images import TextureCache
 from ..materials.types import Reading
 from ..scene.lods import find_chains
-from ..scene.members import check_instances, check_object, scene_members
+from ..scene.members import check_instances
 from ..scene.mesh_arrays import AS_FOUND, to_bake
+from ..scene.parts import parts_of
 from ..scene.target import asset_mesh
 from .asset_path import SUFFIXES, split_spec
+from .clips import gltf_hook, set_frame
+from .fbx_groups import mark_groups
 from .import_warnings import left_out
 from .loaded import before_evaluation, check_loaded, mute_imports
 from .named import check_names
@@ -40,9 +43,9 @@ def load_asset(spec: str, reading: Reading = AS_FOUND, announce: Callable[[str],
     """The asset in a file as one mesh, with its place; nothing stays in the session.
 
     Args:
-        spec: a path, or "file.glb:Object name" for one object, hidden or not. Of a whole file the
-            render-visible objects of the active scene count.
-        reading: how the materials are read.
+        spec: a path, or "file.glb:Name" for an object with those below it, hidden or not, or for a collection. Of a
+            whole file the render-visible objects of the active scene count.
+        reading: how it is read.
         announce: gets a line before what takes a while.
 
     Raises:
@@ -51,35 +54,54 @@ def load_asset(spec: str, reading: Reading = AS_FOUND, announce: Callable[[str],
     """
     path, object_name = split_spec(spec)
     try:
-        unresolved = open_file(path, reading)
-        objects = [_named(object_name, path)] if object_name else scene_members()
-        omissions = (*unresolved, *left_out(path, reading.texture is None))
+        opened = open_file(path, reading)
+        block = named(object_name, path) if object_name else None
+        omissions = (*opened.warnings, *left_out(path, reading.texture is None))
         name, cache = object_name or Path(path).name, TextureCache()
         try:
+            parts = parts_of(block, reading)
+            objects = parts.objects
             if not objects:
                 raise MeshError("no mesh in it; a surface is wanted")
             check_instances(objects)
             baked = to_bake(objects, reading, cache)
             if baked:
                 announce(f"baking {', '.join(baked)} (materials of {name})")
-            found = asset_mesh(objects, name, reading, cache=cache)
+            origin = block if isinstance(block, bpy.types.Object) else None
+            found = asset_mesh(objects, name, reading, origin, cache)
         except FMQMError as error:
             why = f" ({'; '.join(omissions)})" if omissions else ""
             raise type(error)(f"{spec}: {str(error).removeprefix(f'{name}: ')}{why}") from error
-        warnings = tuple(one_line(f"{Path(path).name}: {omission}") for omission in omissions)
-        return replace(found, mesh=replace(found.mesh, warnings=(*warnings, *found.mesh.warnings)))
+        warnings, notes = (
+            tuple(one_line(f"{Path(path).name}: {text}") for text in said)
+            for said in (omissions, (*opened.notes, *parts.notes))
+        )
+        mesh = replace(found.mesh, warnings=(*warnings, *found.mesh.warnings), notes=(*notes, *found.mesh.notes))
+        return replace(found, mesh=mesh)
     finally:
         _clear_session()
 
 
-def open_file(path: str, reading: Reading = AS_FOUND) -> tuple[str, ...]:
+@dataclass(frozen=True)
+class Opened:
+    """What is to be said of a file in the session.
+
+    Attributes:
+        warnings: what it refers to and Blender cannot find, as far as that must be asked before, and what was muted.
+        notes: what misleads nobody.
+    """
+
+    warnings: tuple[str, ...]
+    notes: tuple[str, ...] = ()
+
+
+def open_file(path: str, reading: Reading = AS_FOUND) -> Opened:
     """Opens or imports a file into an emptied session. Nodes of it that read other files are muted.
 
-    Args:
-        reading: what it may name, and how large its images may be.
+    Imported files stand in the pose that their nodes give, without a clip, as files.clips has it.
 
-    Returns:
-        What it refers to and Blender cannot find, as far as that must be asked before, and what was muted.
+    Args:
+        reading: what it may name, how large its images may be, and the frame of its first clip that is wanted.
 
     Raises:
         FileError: the file is missing, unreadable or of an unknown kind, or names what must not be opened.
@@ -104,6 +126,7 @@ def open_file(path: str, reading: Reading = AS_FOUND) -> tuple[str, ...]:
         # what USD finds odd.
         with redirect_stderr(StringIO()), _silent(suffix in _NOISY):
             unresolved += _open(path, suffix, reading)
+            notes = set_frame(suffix, reading.frame)
     except RuntimeError as error:
         said = last_line(error)
         remedy = "export it without this compression, or use another Blender"
@@ -112,11 +135,11 @@ def open_file(path: str, reading: Reading = AS_FOUND) -> tuple[str, ...]:
         raise FileError(f"{path}: {said}; {remedy}") from error
     except UnicodeEncodeError as error:
         raise FileError(f"{path}: Blender takes only names in UTF-8; rename the file or its folder") from error
-    return unresolved
+    return Opened(unresolved, notes)
 
 
 def chains_of_file(path: str, reading: Reading = AS_FOUND) -> list[tuple[str, list[tuple[int, str]]]]:
-    """The chains of detail that the names of a file's objects tell: name, and level and object from fine to coarse.
+    """The chains of detail in a file: name, and level and object or collection from fine to coarse.
 
     Raises:
         FileError: as open_file.
@@ -124,8 +147,8 @@ def chains_of_file(path: str, reading: Reading = AS_FOUND) -> list[tuple[str, li
     try:
         open_file(path, reading)
         return [
-            (name, [(level, object_.name) for level, object_ in levels])
-            for name, levels in find_chains(bpy.context.scene)
+            (chain.name, [(level, asset.name) for level, asset in chain.levels])
+            for chain in find_chains(bpy.context.scene)
         ]
     finally:
         _clear_session()
@@ -177,12 +200,18 @@ def _open(asset: str, suffix: str, reading: Reading) -> tuple[str, ...]:
         raise FileError(
             f"{path}: this Blender has no importer for {suffix}; convert the file, for example to .glb"
         ) from error
-    result = operator(filepath=path, **_OPTIONS.get(suffix, {}))
+    options: dict[str, bool | float] = dict(_OPTIONS.get(suffix, {}))
+    if suffix == ".fbx":  # a clip's frame 0 is where glTF files have it
+        options |= {"use_anim": reading.frame is not None, "anim_offset": 0.0}
+    with gltf_hook(reading.frame is not None):
+        result = operator(filepath=path, **options)
     if "FINISHED" not in result:
         raise FileError(f"{path}: the importer refused it ({', '.join(result).lower()})")
     for image in bpy.data.images if suffix == ".usdz" else ():
         if image.source == "FILE" and image.packed_file is not None:  # by way of a folder with a name by chance
             image.filepath_raw = os.path.join(path, os.path.basename(image.filepath))
+    if suffix == ".fbx":
+        mark_groups(path)
     look()
     return tuple(muted)
 
@@ -206,14 +235,15 @@ _OPTIONS = dict.fromkeys((*_USD, ".abc"), {"validate_meshes": True})
 _NOISY = {".fbx", ".obj", *_USD}
 
 
-def _named(name: str, path: str) -> bpy.types.Object:
-    found = bpy.data.objects.get(name)
+def named(name: str, path: str) -> bpy.types.Object | bpy.types.Collection:
+    """The object, else the collection of an opened file that has a name.
+
+    Raises:
+        FileError: there is none.
+    """
+    found = bpy.data.objects.get(name) or bpy.data.collections.get(name)
     if found is None:
-        raise FileError(f"{path}: no object named {name} in it")
-    try:
-        check_object(found)
-    except MeshError as error:
-        raise MeshError(f"{path}:{error}") from error
+        raise FileError(f"{path}: no object or collection named {name} in it")
     return found
 
 

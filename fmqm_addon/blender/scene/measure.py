@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from ...comparison.alignment import Alignment, AssetMesh, location_counts
 from ...comparison.attribution import Attribution
@@ -20,6 +20,7 @@ from ..materials.images import TextureCache
 from ..materials.types import Reading
 from .bvh import BVHQuery
 from .fingerprint import fingerprint
+from .lods import are_kin
 from .mesh_arrays import AS_FOUND
 from .target import Target, bakes, take
 
@@ -122,7 +123,11 @@ def _work(
     # Read all, then measure: the user may go on working meanwhile.
     read = []
     for index, target in enumerate((reference, *compared)):
+        kin = index > 0 and are_kin(target.find(), reference.find())
         item = yield from _read(target, reading, _READING * index / (len(compared) + 1))
+        if kin:
+            why = f"{target.label}: it is measured with {reference.label}, since one hangs from the other"
+            item = replace(item, asset=None, error=f"{why}; choose assets that stand apart")
         read.append(item)
     share = (1 - _READING) / (len(compared) + 1)
     outcomes: list[Outcome] = []

@@ -10,13 +10,16 @@ import bpy
 import numpy as np
 
 from ...comparison.alignment import AssetMesh
-from ...metric.errors import MeshError
+from ...metric.errors import MeshError, one_line
 from ...metric.geometry import Floats
 from ..materials.images import TextureCache
 from ..materials.types import Reading
 from .evaluated import evaluated
-from .members import check_object, collection_members, family_members, is_measured
+from .members import collection_members, family_members, instances_of, is_measured, shows_surface
 from .mesh_arrays import AS_FOUND, mesh_arrays, to_bake
+from .motion import pose_of
+from .parts import parts_of
+from .render_levels import render_notes, viewport_notes
 from .shaping import check_shaping_images
 
 OBJECT, COLLECTION = "OBJECT", "COLLECTION"
@@ -28,7 +31,7 @@ class Target:
 
     Attributes:
         kind: OBJECT or COLLECTION. name: with its library, as name_full has it.
-        bare: without modifiers; for mesh objects.
+        bare: without its own modifiers; for mesh objects.
     """
 
     kind: str
@@ -54,7 +57,7 @@ class Target:
             return []
         if isinstance(block, bpy.types.Collection):
             return collection_members(block)
-        return family_members(block) if block.type == "EMPTY" else [block]
+        return family_members(block)
 
 
 def target_of(block: bpy.types.Object | bpy.types.Collection, bare: bool = False) -> Target:
@@ -64,11 +67,11 @@ def target_of(block: bpy.types.Object | bpy.types.Collection, bare: bool = False
 def take(target: Target, reading: Reading = AS_FOUND, cache: TextureCache | None = None) -> AssetMesh:
     """The asset's arrays, read from Blender; nothing stays behind.
 
-    An object is itself with its instances. An empty is what hangs from it and what it instances, a collection is
-    what it holds; what is hidden from rendering is left out of either, unless all is.
+    An object stands for itself and what hangs from it, with their instances, a collection for what it holds; what is
+    hidden from rendering is left out of either, unless all is, and what parts.parts_of leaves out.
 
     Args:
-        reading: how the materials are read. cache: of bakes, just before.
+        reading: how it is read. cache: of bakes, just before.
 
     Raises:
         MeshError: it is gone, of another type, or holds nothing that can be measured.
@@ -76,21 +79,25 @@ def take(target: Target, reading: Reading = AS_FOUND, cache: TextureCache | None
     block = target.find()
     if block is None:
         raise MeshError(f"{target.name}: it is no longer in the file; choose another")
-    if isinstance(block, bpy.types.Collection):
-        return asset_mesh(collection_members(block), target.label, reading, cache=cache)
-    if block.type == "EMPTY":
-        return asset_mesh(family_members(block), target.label, reading, block, cache)
-    check_object(block)
-    if not block.users_scene:
+    if isinstance(block, bpy.types.Object) and not block.users_scene:
         raise MeshError(f"{target.name}: it has been deleted from the scene; choose another")
+    parts = parts_of(block, reading)
     if target.bare:
-        return _without_modifiers(block, target.label, reading, cache)
-    return asset_mesh([block], target.label, reading, block, cache)
+        found = _without_modifiers(block, parts.objects, target.label, reading, cache)
+    else:
+        origin = block if isinstance(block, bpy.types.Object) else None
+        found = asset_mesh(parts.objects, target.label, reading, origin, cache)
+    notes = tuple(one_line(f"{target.label}: {note}") for note in parts.notes)
+    return replace(found, mesh=replace(found.mesh, notes=(*notes, *found.mesh.notes)))
 
 
 def bakes(target: Target, reading: Reading, cache: TextureCache) -> tuple[str, ...]:
     """Names of the materials that take will bake; as mesh.to_bake."""
-    return to_bake(target.members(), reading, cache)
+    block = target.find()
+    try:
+        return () if block is None else to_bake(parts_of(block, reading).objects, reading, cache)
+    except MeshError:
+        return ()  # take says why
 
 
 def asset_mesh(
@@ -116,26 +123,33 @@ def asset_mesh(
         origin = next(iter(roots.values())) if len(roots) == 1 else None
     matrix = np.eye(4) if origin is None else _matrix_of(origin)
     check_shaping_images(objects)
-    return AssetMesh(mesh_arrays(objects, name, reading, matrix, cache), matrix)
+    mesh = mesh_arrays(objects, name, reading, matrix, cache)
+    notes = tuple(map(one_line, (*render_notes(objects), *viewport_notes(instances_of(objects)))))
+    return AssetMesh(replace(mesh, notes=(*mesh.notes, *notes)), matrix, pose_of(objects))
 
 
 def contains_surface(block: bpy.types.Object | bpy.types.Collection) -> bool:
     """Whether there is something to measure in an object or collection, faces or not."""
     if isinstance(block, bpy.types.Collection):
         return any(is_measured(object_) for object_ in block.all_objects)
-    return is_measured(block) or (block.type == "EMPTY" and any(map(is_measured, block.children_recursive)))
+    return shows_surface(block)
 
 
 def _without_modifiers(
-    object_: bpy.types.Object, label: str, reading: Reading, cache: TextureCache | None
+    object_: bpy.types.Object,
+    family: Sequence[bpy.types.Object],
+    label: str,
+    reading: Reading,
+    cache: TextureCache | None,
 ) -> AssetMesh:
-    """By way of a duplicate of the object, on the same mesh."""
+    """By way of a duplicate of the object, on the same mesh; those that hang from it are as they are."""
     if object_.mode == "EDIT":
         object_.update_from_editmode()
     duplicate = object_.copy()
     try:
         duplicate.modifiers.clear()
-        result = asset_mesh([duplicate], label, reading, duplicate, cache)
+        others = [each for each in family if each != object_]
+        result = asset_mesh([duplicate, *others], label, reading, duplicate, cache)
         warnings = tuple(w.replace(duplicate.name, object_.name, 1) for w in result.mesh.warnings)
         return replace(result, mesh=replace(result.mesh, warnings=warnings))
     except MeshError as error:
