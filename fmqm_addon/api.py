@@ -41,6 +41,7 @@ def measure(
     bake: int = Reading.bake,
     include: Iterable[str] = (),
     exclude: Iterable[str] = (),
+    align: str = PairOptions.align,
 ) -> list[Outcome]:
     """Scores of objects or collections against a reference.
 
@@ -48,12 +49,13 @@ def measure(
         reference, distorted: objects, which stand for what hangs from them, with their instances; collections.
             Hidden or not. Of levels of detail in one the finest counts, and hulls for collisions do not.
         settings: the paper's if None; `Settings(**PRESETS["fast"])` for a quick look.
-        space: "auto", "world" or "local". match_scale: undo a factor between units.
+        space: "auto", "world" or "local". match_scale: undo a difference in size.
         repeats: measure with so many seeds; scores become means.
         reference_without_modifiers: the reference is its mesh without modifiers, so that an object can be
             measured against itself.
         both: score the other direction too: `outcome.reverse` and `outcome.reverse_perceived`.
         attribution: score geometry and texture apart too: `outcome.attribution`, whose loss it is.
+        align: "icp" refines each placement, rigidly: for scans that stand a little askew.
         bake: side in pixels of the images onto which materials are baked that cannot be read; 0 forbids it.
         include, exclude: patterns of names (`*_body`): of the objects that count, of what they hang from or of their
             collections. No include takes all.
@@ -80,6 +82,7 @@ def measure(
         match_scale=match_scale,
         both=both,
         attribution=attribution,
+        align=align,
     )
     reading = Reading(bake=bake, include=tuple(include), exclude=tuple(exclude))
     reference_target = target_of(reference, bare=reference_without_modifiers)

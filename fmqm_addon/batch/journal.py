@@ -36,7 +36,7 @@ def row_key(row: Row, options: BatchOptions, versions: Mapping[str, str]) -> str
 
     Its id and threshold are not part of it: they can change without a new score.
     """
-    plain = asdict(row) | {"folder": os.path.abspath(row.folder), "id": None, "fail_under": None}
+    plain = asdict(row) | {"folder": os.path.abspath(row.folder), "id": None, "fail_under": None, "level": None}
     stamps = [_stamp(path) for path in row.files()]
     text = json.dumps([plain, options.as_dict(), dict(versions), stamps], sort_keys=True)
     return hashlib.blake2b(text.encode("utf-8", "surrogatepass"), digest_size=16).hexdigest()

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..blender.access import ANYWHERE, Access
+from ..blender.files.asset_path import split_spec
 from ..metric.errors import FileError, FMQMError, SettingsError
 from ..metric.settings import SETTING_NAMES, Settings, info_of
 from .rows import Row
@@ -28,8 +29,11 @@ def plain_rows(reference: str, distorted: Sequence[str], ref_texture: str, textu
     """One reference, any number of distorted; textures are none, one for all or one for each.
 
     Raises:
-        SettingsError: another number of textures.
+        SettingsError: another number of textures, or a pattern that the shell has not replaced by files.
     """
+    for name in distorted:
+        if any(letter in split_spec(name)[0] for letter in "*?[") and not os.path.exists(split_spec(name)[0]):
+            raise SettingsError(f"{name}: no such file; for the files that match, say --glob '{name}'")
     if len(textures) not in (0, 1, len(distorted)):
         raise SettingsError(
             f"--texture is given {len(textures)} times for {len(distorted)} files; give it once, or once per DISTORTED"
@@ -58,8 +62,11 @@ def glob_files(reference: str, pattern: str) -> list[str]:
     return found
 
 
-def lod_rows(path: str, access: Access = ANYWHERE) -> list[Row]:
+def lod_rows(path: str, access: Access = ANYWHERE, thresholds: Sequence[float] = ()) -> list[Row]:
     """Every level of every chain in a file against level 0 and against the level before. Imports bpy.
+
+    Args:
+        thresholds: of the levels below the finest, in their order; the last of all that follow.
 
     Raises:
         FileError: it cannot be opened, or no names in it tell levels.
@@ -72,7 +79,9 @@ def lod_rows(path: str, access: Access = ANYWHERE) -> list[Row]:
         for index, (level, asset) in enumerate(levels[1:]):
             for other, reference in dict.fromkeys((levels[0], levels[index])):
                 against = f"LOD{other}" if other >= 0 else "original"
-                rows.append(Row(f"{name} LOD{level} / {against}".strip(), f"{path}:{reference}", f"{path}:{asset}"))
+                limit = thresholds[min(index, len(thresholds) - 1)] if thresholds else None
+                names = f"{name} LOD{level} / {against}".strip(), f"{path}:{reference}", f"{path}:{asset}"
+                rows.append(Row(*names, fail_under=limit, level=level))
     if not rows:
         raise FileError(f"{path}: no names in it tell levels of detail; wanted are such as Rock_LOD0 and Rock_LOD1")
     return _with_ids(rows)
@@ -122,7 +131,7 @@ def _csv_rows(path: str) -> list[tuple[int, dict[str, Any]]]:
         delimiter = next((each for each in ",;\t" if each in header), ",")
         names = next(csv.reader([header], delimiter=delimiter, skipinitialspace=True), [])
         reader = csv.DictReader(
-            file, [name.strip() for name in names], "", "", delimiter=delimiter, skipinitialspace=True, strict=True
+            file, [_column(name) for name in names], "", "", delimiter=delimiter, skipinitialspace=True, strict=True
         )
         rows = [(1 + reader.line_num, row) for row in reader if any("".join(value) for value in row.values())]
         _check_columns(path, reader.fieldnames or ())
@@ -137,8 +146,17 @@ def _json_rows(path: str) -> list[tuple[int, dict[str, Any]]]:
         rows = json.load(file)
     if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
         raise SettingsError(f"{path}: a list of objects is wanted, one for each pair")
+    for number, row in enumerate(rows, 1):
+        if len({_column(name) for name in row}) < len(row):
+            raise SettingsError(f"{path}, row {number}: a name is there twice")
+    rows = [{_column(name): value for name, value in row.items()} for row in rows]
     _check_columns(path, dict.fromkeys(name for row in rows for name in row))
     return list(enumerate(rows, 1))
+
+
+def _column(name: str) -> str:
+    """A column's name as it is known: people write Reference, and "Fail under"."""
+    return name.strip().lower().replace(" ", "_").replace("-", "_")
 
 
 def _check_columns(path: str, names: Iterable[str]) -> None:

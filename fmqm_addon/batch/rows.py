@@ -71,6 +71,7 @@ class Row:
         fail_under: its own threshold, in [0, 1]; None takes the run's.
         settings: names and values that differ from the run's.
         folder: what relative paths are relative to; "" is the working directory.
+        level: of detail, where the row was made of a chain.
     """
 
     id: str
@@ -81,6 +82,7 @@ class Row:
     fail_under: float | None = None
     settings: tuple[tuple[str, Any], ...] = ()
     folder: str = ""
+    level: int | None = None
 
     def path(self, name: str) -> str:
         """Where a named file is, from the working directory; "" stays ""."""
@@ -95,7 +97,8 @@ class Row:
         """What a record has of it, as plain values for JSON."""
         own = {name: str(value) if value == float("inf") else value for name, value in self.settings}
         textures = {"ref_texture": self.ref_texture or None, "texture": self.texture or None}
-        return {"id": self.id, "reference": self.reference, "distorted": self.distorted, **textures, "settings": own}
+        names = {"id": self.id, "reference": self.reference, "distorted": self.distorted, "level": self.level}
+        return names | textures | {"settings": own}
 
     def failed(self, why: str) -> dict[str, Any]:
         """The record of a row that was not scored."""

@@ -20,8 +20,8 @@ from ..metric.errors import (
     one_line,
 )
 from ..report.explain import explain, where
-from ..report.html.pictures import picture_stem, write_pair_pictures
-from ..report.records import PairScore, pair_record
+from ..report.html.pictures import picture_stem, texture_bytes, write_pair_pictures
+from ..report.records import Costs, PairScore, pair_record
 from .interrupt import defer_interrupts
 from .journal import Journal
 from .progress_log import Log, print_stderr
@@ -171,7 +171,9 @@ class _Scorer:
             patches=len(result.patches),
             samples=len(result.samples.positions),
             space=answer.alignment.label,
-            warnings=(*answer.alignment.notes, *answer.warnings),
+            warnings=answer.warnings,
+            notes=(*reference.mesh.notes, *loaded.mesh.notes, *answer.alignment.notes),
+            costs=_costs(answer),
             reverse=answer.reverse,
             trust=trust_dict(comparison.trust),
             findings=self._findings(row, answer),
@@ -231,3 +233,8 @@ def _reason(error: Exception, name: str) -> str:
         return str(error) + REMEDIES.get(type(error), "")
     kind = MemoryError if isinstance(error, MemoryError) else type(error)  # numpy has one of its own
     return one_line(f"{name}: {kind.__name__}: {error}")
+
+
+def _costs(answer: PairResult) -> Costs:
+    triangles, whole = (surface.preparation.given for surface in (answer.comparison.distorted, answer.reference))
+    return Costs(triangles, triangles / whole, texture_bytes(answer.comparison.distorted))

@@ -110,7 +110,7 @@ def _rows(args: argparse.Namespace, options: BatchOptions) -> list[Row] | None:
     elif args.lods:
         prepare_bpy()
         with defer_interrupts():
-            rows = lod_rows(args.lods, options.reading.access)
+            rows = lod_rows(args.lods, options.reading.access, args.fail_under or ())
     elif args.reference:
         names = glob_files(args.reference, args.glob) if args.glob else args.distorted
         rows = plain_rows(args.reference, names, args.ref_texture or "", args.texture)

@@ -127,7 +127,10 @@ def build_parser(program: str) -> OneLineParser:
     output.add_argument("--picture", metavar="FILE.png", help="reference, distorted and heat map of the one pair")
     output.add_argument("--explain", action="store_true", help="a paragraph a pair: what got worse, where, how surely")
     add_judge(output, "about --fail-under, a manifest's fail_under, heat maps and worst places")
-    output.add_argument("--fail-under", type=float, metavar="X", help="exit code 1 if a score is below X")
+    output.add_argument(
+        "--fail-under", type=_thresholds, metavar="X", help="exit code 1 if a score is below X; for --lods also "
+        "X1,X2,...: of the first level below the finest, of the next; the last of all that follow",
+    )  # fmt: skip
     output.add_argument(
         "--fail-under-p10", type=float, metavar="X",
         help="exit code 1 if the 10th percentile over a pair's patches is below X: its worst places",
@@ -158,14 +161,24 @@ def options_of(args: argparse.Namespace) -> BatchOptions:
     return BatchOptions(pair=pair, reading=reading, explain=args.explain, report=args.report or "", judge=judge)
 
 
+def _thresholds(text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text} is no number, nor numbers with commas between") from error
+
+
 def check_arguments(args: argparse.Namespace) -> None:
     for flag in ("max_image_side", "max_image_bytes"):
         limit = getattr(args, flag)
         if limit is not None and limit < 1:
             raise SettingsError(f"{flag.replace('_', '-')} is {limit}; it must be at least 1")
-    for flag, least in (("fail-under", args.fail_under), ("fail-under-p10", args.fail_under_p10)):
+    limits = [("fail-under", limit) for limit in args.fail_under or ()]
+    for flag, least in (*limits, ("fail-under-p10", args.fail_under_p10)):
         if least is not None and not 0 <= least <= 1:
             raise SettingsError(f"{flag} is {least}; it must be between 0 and 1")
+    if len(limits) > 1 and not args.lods:
+        raise SettingsError("--fail-under takes several numbers for the levels of --lods; give one")
     for flag, ending in (("save_fields", ".npz"), ("picture", ".png")):
         path = getattr(args, flag)
         if path and not path.lower().endswith(ending):
@@ -207,8 +220,8 @@ def check_arguments(args: argparse.Namespace) -> None:
 
 
 def criteria_of(args: argparse.Namespace) -> Criteria:
-    """What all pairs must reach."""
-    return Criteria(args.judge, args.fail_under, args.fail_under_p10)
+    """What all pairs must reach that have no threshold of their own."""
+    return Criteria(args.judge, args.fail_under[-1] if args.fail_under else None, args.fail_under_p10)
 
 
 def _check_sources(args: argparse.Namespace) -> None:

@@ -14,7 +14,7 @@ from ..metric.errors import SettingsError
 from ..metric.settings import Settings, info_of, setting
 from ..metric.stepper import Stepper, Work, as_part
 from ..metric.surface import QueryBuilder, Surface
-from .alignment import SPACES, Alignment, AssetMesh, align
+from .alignment import ALIGNS, SPACES, Alignment, AssetMesh, align
 from .attribution import Attribution, attribute
 from .measurement import Comparison, Measurement, Readings
 from .pose import pose_warnings
@@ -28,6 +28,7 @@ class PairOptions:
     Attributes:
         settings: of the metric. repeats: seeds settings.seed to settings.seed + repeats - 1.
         space, match_scale: as in comparison.alignment.align.
+        align: "icp" refines each placement, as there.
         both: score the other direction too. attribution: score geometry and texture apart too.
 
     Raises:
@@ -42,7 +43,12 @@ class PairOptions:
         "unless another place fits far better",
         choices=SPACES,
     )
-    match_scale: bool = setting(False, "undo a difference in size by a factor between units, such as 100, 1000 or 2.54")
+    match_scale: bool = setting(
+        False, "undo a difference in size: a factor between units, such as 2.54, or any that fits"
+    )
+    align: str = setting(
+        "none", "refine the placement: icp does so rigidly, for scans that stand a little askew", choices=ALIGNS
+    )
     both: bool = setting(
         False, "score the other direction too, which sees what only the distorted has; takes twice as long"
     )
@@ -53,6 +59,9 @@ class PairOptions:
     def __post_init__(self) -> None:
         if not isinstance(self.settings, Settings):
             raise SettingsError(f"settings are {self.settings!r}; they must be Settings(...)")
+        for name, choices in (("space", SPACES), ("align", ALIGNS)):
+            if getattr(self, name) not in choices:
+                raise SettingsError(f"{name} is {getattr(self, name)!r}; it must be one of {', '.join(choices)}")
         if fault := info_of(PairOptions, "repeats").fault(self.repeats):
             raise SettingsError(f"repeats is {self.repeats}; it must be {fault}")
         self.settings.with_seed(self.settings.seed + self.repeats - 1)  # it raises what is wrong with the last seed
@@ -60,9 +69,8 @@ class PairOptions:
     def as_dict(self) -> dict[str, Any]:
         """Plain values of all that decides the scores, under the names of the command line's flags."""
         rest = {"repeats": self.repeats, "space": self.space, "match_scale": self.match_scale}
-        return self.settings.as_dict() | rest
-        if self.space not in SPACES:
-            raise SettingsError(f"space is {self.space!r}; it must be one of {', '.join(SPACES)}")
+        refined = {} if self.align == "none" else {"align": self.align}
+        return self.settings.as_dict() | rest | refined
 
 
 @dataclass(frozen=True)
@@ -118,7 +126,9 @@ def _comparing_pair(
     options: PairOptions,
     known: Sequence[Fact],
 ) -> Work[PairResult]:
-    alignment = align(reference, compared, options.space, options.match_scale)
+    alignment = align(
+        reference, compared, options.space, options.match_scale, measurement.reference, options.align == "icp"
+    )
     posed = pose_warnings(reference.mesh.name, reference.pose, compared.mesh.name, compared.pose)
     alignment = replace(alignment, warnings=(*alignment.warnings, *posed))
     share = 1 / (1 + options.both + 2 * options.attribution)  # attribution makes two comparisons

@@ -9,7 +9,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from .criteria import below, judge_of, shortfall
-from .records import PERCEIVED, SHOWN, value_of
+from .records import BESIDE, PERCEIVED, SEPARATOR, SHOWN, value_of
 
 _NOT_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
@@ -41,6 +41,10 @@ def _case(record: Mapping[str, Any]) -> ElementTree.Element:
         properties = ElementTree.SubElement(case, "properties")
         for name in (*SHOWN, *PERCEIVED, "fmqm_p10"):
             ElementTree.SubElement(properties, "property", name=name, value=repr(value_of(record, name)))
+        for name in BESIDE:
+            if record[name] not in (None, []):
+                text = SEPARATOR.join(record[name]) if isinstance(record[name], list) else repr(record[name])
+                ElementTree.SubElement(properties, "property", name=name, value=_text(text))
     if record["error"] is not None:
         ElementTree.SubElement(case, "error", message=_text(record["error"]))
     elif below(record):

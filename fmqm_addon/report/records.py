@@ -9,7 +9,7 @@ import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..comparison.measurement import Readings
 from ..metric.errors import one_line
@@ -22,10 +22,20 @@ SHOWN = ("FMQM", *(name for name in COLUMNS if name != "FMQM"))  # the score fir
 PERCEIVED = {"perceived": "score", **{name: name for name in Perceived._fields[1:-1]}, "perceived_p10": "p10"}
 TABLE = (*SHOWN, "perceived")
 STAGES = ("load", "prepare", "fields", "features", "total")
+BESIDE = ("triangles", "triangle_share", "texture_bytes", "level", "notes", "warnings")  # columns after the scores
+SEPARATOR = " | "  # of notes and warnings in one cell
 REVERSE = "reverse "  # before the names of the other direction's columns
 _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "\uff1d", "\uff0b", "\uff0d", "\uff20")  # the last are wide ones
 _QUOTED = re.compile('[,"\r\n]')  # readers end a line at either of the last two
 _LONE = re.compile("[\ud800-\udfff]")
+
+
+class Costs(NamedTuple):
+    """What the distorted asset costs: its triangles, their share of the reference's, bytes of its color images."""
+
+    triangles: int
+    triangle_share: float
+    texture_bytes: int
 
 
 @dataclass(frozen=True)
@@ -36,7 +46,8 @@ class PairScore:
         reference, distorted: as the user named them.
         readings: None where there are none.
         seconds: by STAGES; what several pairs share is counted in the first.
-        error: why there are no scores.
+        warnings: why a score should not be believed as it stands. notes: what was done that misleads nobody.
+        error: why there are no scores. level: of detail, where that is known. costs: None where there are no scores.
         space: where the two were compared, as comparison.alignment.Alignment.label has it.
         reverse: readings of the other direction, the distorted mesh as the reference; None: not asked for.
         trust: as report.trust_table.trust_dict has it.
@@ -50,7 +61,10 @@ class PairScore:
     samples: int | None = None
     seconds: dict[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     error: str | None = None
+    level: int | None = None
+    costs: Costs | None = None
     space: str | None = None
     reverse: Readings | None = None
     trust: Report | None = None
@@ -101,9 +115,10 @@ def csv_parts(records: Iterable[Mapping[str, Any]], raw: bool = False) -> Iterat
     """
     names, numbers = ("id", "reference", "distorted"), (*SHOWN, *PERCEIVED)
     turned = numbers if _any_reverse(records) else ()
-    yield _csv_line((*names, *numbers, "error", *(f"{REVERSE}{name}" for name in turned)))
+    yield _csv_line((*names, *numbers, "error", *BESIDE, *(f"{REVERSE}{name}" for name in turned)))
     for record in records:
         values = [record[name] for name in names] + [value_of(record, name) for name in numbers] + [record["error"]]
+        values += [_joined(record[name]) for name in BESIDE]
         reverse = record["reverse"] or _UNREAD
         yield _csv_line(values + [value_of(reverse, name) for name in turned], raw)
 
@@ -145,7 +160,10 @@ def pair_record(pair: PairScore) -> dict[str, Any]:
         "space": pair.space,
         "seconds": {stage: pair.seconds.get(stage, 0.0) for stage in STAGES},
         "warnings": list(pair.warnings),
+        "notes": list(pair.notes),
         "error": pair.error,
+        "level": pair.level,
+        **(dict.fromkeys(Costs._fields) if pair.costs is None else pair.costs._asdict()),
         "reverse": None if pair.reverse is None else _read(pair.reverse),
         "trust": pair.trust,
         **pair.findings,
@@ -190,6 +208,10 @@ def _csv_cell(value: str | float | None, raw: bool) -> str:
     is_formula = not raw and value.startswith(_FORMULA)
     text = f"'{value}" if is_formula else value
     return '"' + text.replace('"', '""') + '"' if is_formula or _QUOTED.search(text) else text
+
+
+def _joined(value: Any) -> Any:
+    return SEPARATOR.join(value) if isinstance(value, list) else value
 
 
 def _columns(values: Scores) -> dict[str, float]:

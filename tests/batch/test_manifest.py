@@ -146,3 +146,32 @@ def test_rows_that_share_a_reference_come_together() -> None:
 def test_a_task_survives_json() -> None:
     row = Row("1", "ä", "x", "t", "u", 0.5, (("seed", 1), ("gradient_radius", float("inf"))), "folder")
     assert task_of(json.loads(json.dumps(Task("key", row).as_dict()))) == Task("key", row)
+
+
+def test_headers_ignore_case_and_blanks(tmp_path: Path) -> None:
+    text = "Reference, DISTORTED,Fail under,Color-Units\nrock.glb,lod.glb,0.9,7\n"
+    (row,) = read_manifest(write(tmp_path, text), SETTINGS)
+    assert (row.reference, row.distorted, row.fail_under) == ("rock.glb", "lod.glb", 0.9)
+    assert row.settings == (("color_units", 7),)
+    plain = [{"Reference": "rock.glb", "Distorted": "lod.glb", "Fail Under": 0.9, "Color Units": 7}]
+    assert read_manifest(write(tmp_path, json.dumps(plain), "pairs.json"), SETTINGS) == [row]
+    for name, twice in (
+        ("a.csv", "Reference,reference,distorted\na,b,c\n"),
+        ("a.json", json.dumps([{"reference": "a", "REFERENCE": "b", "distorted": "c"}])),
+    ):
+        with pytest.raises(SettingsError, match="there twice"):
+            read_manifest(write(tmp_path, twice, name), SETTINGS)
+
+
+@pytest.mark.parametrize("name", ["lods\\*.glb", "lods/rock_LOD?.glb", "*.blend:Rock"])
+def test_patterns_that_no_shell_has_replaced_name_glob(name: str) -> None:
+    with pytest.raises(SettingsError, match="say --glob"):
+        plain_rows("rock.glb", [name], "", ())
+
+
+def test_a_file_may_be_called_like_a_pattern(tmp_path: Path) -> None:
+    (tmp_path / "rock [1].glb").touch()
+    (row,) = plain_rows("rock.glb", [str(tmp_path / "rock [1].glb")], "", ())
+    assert row.distorted.endswith("rock [1].glb")
+    (row,) = plain_rows("rock.glb", ["rock.blend:Rock [old]*"], "", ())
+    assert row.distorted == "rock.blend:Rock [old]*"

@@ -284,7 +284,8 @@ def test_junit(assets: Path, tmp_path: Path) -> None:
     assert done.returncode == 1
     suite = ElementTree.parse(tmp_path / "x").getroot()[0]
     assert [suite.get(name) for name in ("tests", "failures", "errors")] == ["4", "1", "1"]
-    cases = {case.get("name"): [child.tag for child in case if child.tag != "system-out"] for case in suite}
+    beside = ("system-out", "properties")
+    cases = {case.get("name"): [child.tag for child in case if child.tag not in beside] for case in suite}
     assert cases == {"ref.obj": [], SHAKEN[9]: ["failure"], SHAKEN[19]: [], "cut.glb": ["error"]}
     message = suite.find("*/failure").get("message")  # type: ignore[union-attr]
     assert "below 0.999" in message and all(name in message for name in COLUMNS)
@@ -337,6 +338,10 @@ def test_lod_chains_of_a_file(assets: Path, tmp_path: Path) -> None:
         assert list(pairs) == ["Rock LOD1 / LOD0", "Rock LOD2 / LOD0", "Rock LOD2 / LOD1"]
         assert pairs["Rock LOD2 / LOD1"]["reference"] == f"{name}:Rock_LOD1"
         assert 1 > pairs["Rock LOD1 / LOD0"]["FMQM"] > pairs["Rock LOD2 / LOD0"]["FMQM"]
+        assert [pair["level"] for pair in pairs.values()] == [1, 2, 2]
+    done = score("--lods", "rock.glb", *TINY, "--json", "j", "--quiet", "--fail-under", "0.999,0.1", cwd=tmp_path)
+    assert done.returncode == 1 and "Rock LOD1 / LOD0" in done.stderr and "Rock LOD2" not in done.stderr
+    assert [pair["fail_under"] for pair in read_json(tmp_path / "j")["pairs"]] == [0.999, 0.1, 0.1]
     done = score("--lods", assets / "ref.obj", *TINY)
     assert done.returncode == 1 and "ref.obj: no names in it tell levels" in done.stderr
 
@@ -382,6 +387,9 @@ MISSING = ("none.csv: cannot be read", "no file matches")  # files, which are no
     [
         (("--manifest", "none.csv"), "none.csv: cannot be read"),
         (("--manifest", "bad.csv"), "bad.csv, row 2: samples is x"),
+        (("a.obj", "b.obj", "--fail-under", "0.9,0.8"), "several numbers for the levels of --lods"),
+        (("a.obj", "b.obj", "--fail-under", "0.9,x"), "0.9,x is no number"),
+        (("--lods", "x.blend", "--fail-under", "0.9,1.5"), "fail-under is 1.5; it must be between 0 and 1"),
         (("--manifest", "bad.csv", "ref.obj"), "--manifest"),
         (("--manifest", "bad.csv", "--lods", "x.blend"), "leave out --lods"),
         (("--manifest", "bad.csv", "--texture", "a.png"), "name them in a manifest"),

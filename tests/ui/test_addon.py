@@ -693,7 +693,7 @@ def test_every_flag_of_the_script_is_a_property() -> None:
     from fmqm_addon.metric.settings import SETTING_NAMES
 
     properties = bpy.context.scene.fmqm.settings.bl_rna.properties
-    for name in (*SETTING_NAMES, "repeats", "space", "match_scale", "both", "attribution", "preset"):
+    for name in (*SETTING_NAMES, "repeats", "space", "match_scale", "align", "both", "attribution", "preset"):
         assert name in properties
 
 

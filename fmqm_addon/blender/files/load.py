@@ -12,11 +12,14 @@ from io import StringIO
 from pathlib import Path
 
 import bpy
+import numpy as np
 
 from ...comparison.alignment import AssetMesh
-from ...metric.errors import FileError, FMQMError, MeshError, one_line
+from ...metric.errors import FileError, FMQMError, ImageMissingError, MeshError, one_line
+from ...metric.geometry import Floats
 from ...metric.surface import MeshArrays
 from ..access import check_asset
+from ..materials.image_files import image_path
 from ..materials.images import TextureCache
 from ..materials.types import Reading
 from ..scene.lods import find_chains
@@ -26,12 +29,15 @@ from ..scene.parts import parts_of
 from ..scene.target import asset_mesh
 from .asset_path import SUFFIXES, split_spec
 from .clips import gltf_hook, set_frame
+from .far import in_world, moved_copy, offset_of
 from .fbx_groups import mark_groups
 from .import_warnings import left_out
 from .loaded import before_evaluation, check_loaded, mute_imports
 from .named import check_names
 from .preflight import check_beside
 from .preflight_file import check_file
+from .textures import find_textures
+from .undecodable import why_no_image, why_not_imported
 
 
 def load_mesh(spec: str, reading: Reading = AS_FOUND) -> MeshArrays:
@@ -54,7 +60,8 @@ def load_asset(spec: str, reading: Reading = AS_FOUND, announce: Callable[[str],
     """
     path, object_name = split_spec(spec)
     try:
-        opened = open_file(path, reading)
+        offset = offset_of(path) if os.path.isfile(path) else None
+        opened = open_file(path, reading, offset)
         block = named(object_name, path) if object_name else None
         omissions = (*opened.warnings, *left_out(path, reading.texture is None))
         name, cache = object_name or Path(path).name, TextureCache()
@@ -68,10 +75,11 @@ def load_asset(spec: str, reading: Reading = AS_FOUND, announce: Callable[[str],
             if baked:
                 announce(f"baking {', '.join(baked)} (materials of {name})")
             origin = block if isinstance(block, bpy.types.Object) else None
-            found = asset_mesh(objects, name, reading, origin, cache)
+            found = _moved_back(asset_mesh(objects, name, reading, origin, cache), path, offset)
         except FMQMError as error:
             why = f" ({'; '.join(omissions)})" if omissions else ""
-            raise type(error)(f"{spec}: {str(error).removeprefix(f'{name}: ')}{why}") from error
+            said = isinstance(error, ImageMissingError) and why_no_image(path)
+            raise type(error)(f"{spec}: {said or str(error).removeprefix(f'{name}: ')}{why}") from error
         warnings, notes = (
             tuple(one_line(f"{Path(path).name}: {text}") for text in said)
             for said in (omissions, (*opened.notes, *parts.notes))
@@ -95,13 +103,14 @@ class Opened:
     notes: tuple[str, ...] = ()
 
 
-def open_file(path: str, reading: Reading = AS_FOUND) -> Opened:
+def open_file(path: str, reading: Reading = AS_FOUND, offset: Floats | None = None) -> Opened:
     """Opens or imports a file into an emptied session. Nodes of it that read other files are muted.
 
     Imported files stand in the pose that their nodes give, without a clip, as files.clips has it.
 
     Args:
         reading: what it may name, how large its images may be, and the frame of its first clip that is wanted.
+        offset: (3,) taken off a text file's vertices, as files.far has it.
 
     Raises:
         FileError: the file is missing, unreadable or of an unknown kind, or names what must not be opened.
@@ -125,17 +134,25 @@ def open_file(path: str, reading: Reading = AS_FOUND) -> Opened:
         # Blender prints the tracebacks of importers written in Python, each folder where it looks for an image, and
         # what USD finds odd.
         with redirect_stderr(StringIO()), _silent(suffix in _NOISY):
-            unresolved += _open(path, suffix, reading)
-            notes = set_frame(suffix, reading.frame)
+            muted, notes = _open(path, suffix, reading, offset)
+            notes = (*notes, *set_frame(suffix, reading.frame))
     except RuntimeError as error:
         said = last_line(error)
-        remedy = "export it without this compression, or use another Blender"
-        if not any(kind in said.lower() for kind in ("draco", "meshopt")):  # whose decoders some Blenders lack
-            remedy = "check the file, or export it again"
-        raise FileError(f"{path}: {said}; {remedy}") from error
+        why = why_not_imported(path, said) or f"{said}; check the file, or export it again"
+        raise FileError(f"{path}: {why}") from error
     except UnicodeEncodeError as error:
         raise FileError(f"{path}: Blender takes only names in UTF-8; rename the file or its folder") from error
-    return Opened(unresolved, notes)
+    except OSError as error:
+        raise FileError(f"{path}: no room for a temporary copy of it ({error.strerror}); free some") from error
+    return Opened((*unresolved, *muted), notes)
+
+
+def _moved_back(found: AssetMesh, path: str, offset: Floats | None) -> AssetMesh:
+    """With the offset of its file added again, in double precision."""
+    if offset is None:
+        return found
+    shift = np.linalg.inv(found.origin[:3, :3]) @ in_world(path, offset)
+    return replace(found, mesh=replace(found.mesh, positions=found.mesh.positions + shift))
 
 
 def chains_of_file(path: str, reading: Reading = AS_FOUND) -> list[tuple[str, list[tuple[int, str]]]]:
@@ -178,8 +195,8 @@ def _silent(silent: bool) -> Iterator[None]:
         os.close(kept)
 
 
-def _open(asset: str, suffix: str, reading: Reading) -> tuple[str, ...]:
-    """Opens or imports a file into the empty session; says what was muted."""
+def _open(asset: str, suffix: str, reading: Reading, offset: Floats | None) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Opens or imports a file into the empty session; says what was muted, and which images were found elsewhere."""
     path, muted = os.path.abspath(asset), list[str]()
 
     def look() -> None:
@@ -192,7 +209,7 @@ def _open(asset: str, suffix: str, reading: Reading) -> tuple[str, ...]:
     if suffix == ".blend":
         with before_evaluation(look):
             bpy.ops.wm.open_mainfile(filepath=path, load_ui=False, use_scripts=False)
-        return tuple(muted)
+        return tuple(muted), ()
     operator = _IMPORTERS[suffix]()
     try:
         operator.get_rna_type()
@@ -203,8 +220,11 @@ def _open(asset: str, suffix: str, reading: Reading) -> tuple[str, ...]:
     options: dict[str, bool | float] = dict(_OPTIONS.get(suffix, {}))
     if suffix == ".fbx":  # a clip's frame 0 is where glTF files have it
         options |= {"use_anim": reading.frame is not None, "anim_offset": 0.0}
-    with gltf_hook(reading.frame is not None):
-        result = operator(filepath=path, **options)
+    with moved_copy(path, offset) as copy:
+        with gltf_hook(reading.frame is not None):
+            result = operator(filepath=copy, **options)
+        for image in bpy.data.images if copy != path else ():
+            image.filepath = image_path(image)  # as long as the copy's folder is there, which it begins with
     if "FINISHED" not in result:
         raise FileError(f"{path}: the importer refused it ({', '.join(result).lower()})")
     for image in bpy.data.images if suffix == ".usdz" else ():
@@ -212,8 +232,9 @@ def _open(asset: str, suffix: str, reading: Reading) -> tuple[str, ...]:
             image.filepath_raw = os.path.join(path, os.path.basename(image.filepath))
     if suffix == ".fbx":
         mark_groups(path)
+    notes = find_textures(asset, reading.access)
     look()
-    return tuple(muted)
+    return tuple(muted), notes
 
 
 _IMPORTERS: dict[str, Callable[[], bpy.types.Operator]] = {
@@ -253,5 +274,20 @@ def last_line(error: RuntimeError, program: str = "the importer") -> str:
     if not lines:
         return f"{program} failed without saying why"
     if any(line.endswith("Traceback (most recent call last):") for line in lines):
-        return f"{program} broke off ({lines[-1]})"
+        return f"{program} broke off ({_asserted(lines) if lines[-1] == 'AssertionError' else lines[-1]})"
     return lines[-1].removeprefix("Error: ").rstrip(".")
+
+
+def _asserted(lines: list[str]) -> str:
+    """What an importer's assertion means that says nothing itself, by the lines of its traceback."""
+    code = next((line for line in reversed(lines) if line.startswith("assert ")), "")
+    known = next((meaning for part, meaning in _ASSERTIONS.items() if part in code), "")
+    return known or code.removeprefix("assert ") or "AssertionError"
+
+
+# Of the glTF importer, by what it asserts.
+_ASSERTIONS = {
+    "parent is None": "one of its nodes is the child of two",
+    "MAT2": "it has an accessor of MAT2 or MAT3, which Blender does not read",
+    "stride": "the stride of an accessor is no multiple of its elements' size",
+}

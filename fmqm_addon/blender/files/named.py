@@ -78,11 +78,11 @@ def _map_names(rest: bytes) -> Iterator[bytes]:
 
 
 def _check_gltf(path: str, access: Access) -> None:
-    names = (name for name in _uris(_gltf_document(path)) if not name.startswith("data:"))
+    names = (name for name in _uris(gltf_document(path)) if not name.startswith("data:"))
     check_named(path, names, os.path.dirname(path), access)
 
 
-def _gltf_document(path: str) -> Any:
+def gltf_document(path: str) -> Any:
     """The JSON of a glTF file of either kind; None where there is none, which the importer judges."""
     with open(path, "rb") as file:
         head = file.read(20)

@@ -12,12 +12,14 @@ from urllib.parse import quote
 
 import numpy as np
 
-from ...metric.errors import FileError
+from ...metric.errors import FileError, MeshError
 from ..limits import MAX_DEPTH
 from ..materials.image_files import crashes
 from ..materials.image_headers import file_header
 
 _COUNT = re.compile(rb"-?0*\d{1,9}")  # Blender would end the process at 2^31
+_PLY_ELEMENT = re.compile(rb"^element[ \t]+(\S+)[ \t]+(\d+)[ \t\r]*$", re.MULTILINE)
+_PLY_POINTS = (b"vertex", b"chunk", b"sh", b"camera", b"point")  # what clouds consist of
 _OGAWA_DATA = 1 << 63  # marks the position of data, not of a group
 _JPEG_2000 = (".jp2", ".j2k", ".j2c", ".jpc")
 _PLY_BYTES = {
@@ -134,6 +136,7 @@ def check_ply(path: str) -> tuple[str, ...]:
         if words[:1] == [b"element"] and not (len(words) == 3 and _COUNT.fullmatch(words[2])):
             said = line.decode("latin-1")[:80]
             raise FileError(f"{path}: the PLY header says {said!r}; a name and a count below a billion are wanted")
+    _check_faces(path, data, header)
     order: Literal["little", "big"] = "big" if b"format binary_big_endian" in header else "little"
     if data.startswith(b"ply") and b"format ascii" in header and len(header) < len(data):
         _check_text(path, header, len(data) - len(header))
@@ -160,6 +163,15 @@ def check_ply(path: str) -> tuple[str, ...]:
     if position > len(data):
         raise FileError(f"{path}: the PLY file is truncated")
     return ()
+
+
+def _check_faces(path: str, data: bytes, header: bytes) -> None:
+    """Scans and splats are clouds of points: told before an importer says less of them."""
+    elements = [(found[1], int(found[2])) for found in _PLY_ELEMENT.finditer(header)]
+    points = dict(elements).get(b"vertex", 0)
+    is_cloud = points > 0 and not any(count for name, count in elements if name not in _PLY_POINTS)
+    if is_cloud and data.startswith(b"ply") and len(header) < len(data):
+        raise MeshError(f"{path}: points or splats ({points:,}), no faces; a surface is wanted, so mesh them first")
 
 
 def _check_text(path: str, header: bytes, length: int) -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import io
 import os
@@ -71,7 +72,27 @@ def why_unread(image: bpy.types.Image) -> str:
         what = "is missing"
     elif "\\" in path and os.sep == "/":
         what = "has a backslash in its name, which Blender takes for a slash"
+    elif kind := _foreign_kind(image, path):
+        what = f"is in {kind}, which Blender does not decode: convert it to a PNG"
     return f"{path or image.name}: the base-color image {what}"
+
+
+def _foreign_kind(image: bpy.types.Image, path: str) -> str:
+    """The kind of an image that is known and that no Blender decodes, with a tool that does; "" of others."""
+    start = b""
+    if image.packed_file is not None:
+        start = image.packed_file.data[:16]
+    elif os.path.isfile(path):
+        with contextlib.suppress(OSError), open(path, "rb") as file:
+            start = file.read(16)
+    return next((kind for place, magic, kind in _FOREIGN if start[place : place + len(magic)] == magic), "")
+
+
+_FOREIGN = (
+    (4, b"ftypavif", "AVIF (avifdec in.avif out.png)"),
+    (4, b"ftypheic", "HEIC (heif-convert in.heic out.png)"),
+    (0, b"\xabKTX 20\xbb", "KTX2 (ktx extract --transcode rgba8 in.ktx2 out.png)"),
+)
 
 
 def check_limits(image: bpy.types.Image, limits: ImageLimits) -> None:

@@ -194,10 +194,15 @@ def _row_blocks(values: NDArray[Any]) -> list[slice]:
 
 
 def black_warnings(name: str, values: NDArray[Any]) -> tuple[str, ...]:
-    """A warning where an image shows nothing but black, as those do that Blender cannot decode and calls loaded."""
+    """A warning where an image shows nothing but black: its alpha is 0, or Blender cannot decode it and calls it
+    loaded."""
     darkest = 1 if values.dtype == np.uint8 else DARKEST
     if any((values[rows, :, :3] >= darkest).any() for rows in _row_blocks(values)):
         return ()
+    if values.shape[2] == 4 and not any(values[rows, :, 3].any() for rows in _row_blocks(values)):
+        return (
+            f"{name} has an alpha of 0 all over, so that Blender shows black; save it without alpha to show its color",
+        )
     return (f"{name} is black all over; unless it is meant to be, Blender could not decode it: save it as a PNG",)
 
 

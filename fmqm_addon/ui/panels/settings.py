@@ -36,6 +36,7 @@ class FMQM_PT_settings(Sidebar, bpy.types.Panel):  # noqa: N801
         column = layout.column()
         column.prop(settings, "space")
         column.prop(settings, "match_scale")
+        column.prop(settings, "align")
         column.prop(settings, "both")
         column.prop(settings, "attribution")
         column = layout.column(align=True)

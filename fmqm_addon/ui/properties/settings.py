@@ -136,6 +136,15 @@ class FMQMSettings(bpy.types.PropertyGroup):
         default=PairOptions.space.upper(),
     )
     match_scale: BoolProperty(**_about("match_scale", PairOptions))
+    align: EnumProperty(
+        name="Refine",
+        description="What refines the placement",
+        items=[
+            ("NONE", "Nothing", "Each stands where Space has put it"),
+            ("ICP", "Closest Points", "Rigidly onto the reference's nearest points: for scans a little askew"),
+        ],
+        default=PairOptions.align.upper(),
+    )
     both: BoolProperty(**_about("both", PairOptions, name="Both Directions"))
     attribution: BoolProperty(**_about("attribution", PairOptions))
     include: StringProperty(
@@ -154,7 +163,7 @@ class FMQMSettings(bpy.types.PropertyGroup):
 PRESET_PROPERTIES = tuple(
     name
     for name in FMQMSettings.__annotations__
-    if name not in {"preset", "seed", "space", "match_scale", "both", "attribution", "include", "exclude"}
+    if name not in {"preset", "seed", "space", "match_scale", "align", "both", "attribution", "include", "exclude"}
 )
 _PAPER: dict[str, Any] = {
     **{name: getattr(Settings(), name) for name in SETTING_NAMES if name not in {"seed", "scored_patches"}},
@@ -206,6 +215,7 @@ def pair_options(settings: FMQMSettings) -> PairOptions:
         repeats=settings.repeats,
         space=settings.space.lower(),
         match_scale=settings.match_scale,
+        align=settings.align.lower(),
         both=settings.both,
         attribution=settings.attribution,
     )

@@ -584,8 +584,8 @@ def test_kinds_of_files_whose_axes_differ(tmp_path: Path) -> None:
             alignment = align(reference, load_asset(str(tmp_path / f"monkey.{other}")))
             assert measurement.compare(alignment.mesh).run().scores[0] >= 0.999, (kind, other)
             turns[kind, other] = alignment.turn
-    assert turns["glb", "ply"] == 90 and turns["stl", "glb"] == -90
-    assert turns["ply", "stl"] == turns["obj", "glb"] == 0
+    assert turns["glb", "ply"] == "90 degrees about X" and turns["stl", "glb"] == "-90 degrees about X"
+    assert turns["ply", "stl"] == turns["obj", "glb"] == ""
 
 
 def rigged() -> bpy.types.Object:

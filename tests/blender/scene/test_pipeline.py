@@ -115,3 +115,22 @@ def test_anything_is_measured_or_refused(
     except FMQMError as error:
         assert len(str(error).splitlines()) == 1
     assert scenes.blocks() == before
+
+
+def test_objects_of_the_scene_are_placed_as_files_are() -> None:
+    """Turned in its vertices, with another pivot, and askew: in the window and in Python as on the command line."""
+    from mathutils import Euler
+
+    from fmqm_addon import api
+
+    reference, turned, askew = (scenes.monkey(name) for name in ("Reference", "Turned", "Askew"))
+    for each in (reference, turned, askew):
+        each.matrix_world = Matrix()
+    turned.data.transform(Matrix.Translation((0, 0, 3)) @ Matrix.Rotation(np.pi, 4, "Z"))
+    askew.data.transform(Euler((0.05, 0.02, -0.06)).to_matrix().to_4x4())
+    small = api.Settings(samples=3000, patches=20)
+    (outcome,) = api.measure(reference, turned, small)
+    assert outcome.pair_result is not None and outcome.pair_result.alignment.turn == "180 degrees about Z"
+    assert outcome.scores is not None and outcome.scores.FMQM > 0.99
+    plain, refined = (api.measure(reference, askew, small, align=align)[0].scores for align in ("none", "icp"))
+    assert plain is not None and refined is not None and refined.FMQM > 0.99 > plain.FMQM
