@@ -172,7 +172,7 @@ class _Scorer:
             samples=len(result.samples.positions),
             space=answer.alignment.label,
             warnings=answer.warnings,
-            notes=(*reference.mesh.notes, *loaded.mesh.notes, *answer.alignment.notes),
+            notes=answer.notes,
             costs=_costs(answer),
             reverse=answer.reverse,
             trust=trust_dict(comparison.trust),

@@ -239,6 +239,7 @@ def _json_text(
         "judge": judge,
         "settings": settings.as_dict(),
         "warnings": list(result.warnings),
+        "notes": list(result.notes),
         "found": [
             {"geometry": _found_dict(outcome.geometry), "texture": _found_dict(outcome.texture), "file": path}
             for outcome, path in zip(result.results, saved, strict=True)

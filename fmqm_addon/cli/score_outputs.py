@@ -15,7 +15,7 @@ from ..report.criteria import below, shortfall
 from ..report.explain import explain
 from ..report.html.page import write_page
 from ..report.junit import junit_parts
-from ..report.records import csv_parts, json_parts, table_parts, trust_parts
+from ..report.records import csv_parts, json_parts, note_parts, table_parts, trust_parts
 from .process import FAILED, OK
 from .score_arguments import output_files, page_file, shard_of
 
@@ -68,6 +68,7 @@ def _table_parts(args: argparse.Namespace, records: Iterable[Mapping[str, Any]])
     yield from table_parts(records)
     if args.verbose:
         yield from trust_parts(records)
+        yield from note_parts(records)
     if args.explain:
         for record in records:
             # A pair without scores of its own process, such as a lost one, comes without an explanation.

@@ -102,8 +102,9 @@ class Search:
         self._two_rounds = written is not None or not self._same_settings
         self._measurements: dict[bool, Measurement] = {}
         self._steps: dict[tuple[bool, Version], Step] = {}
-        self.triangles = 0  # of the asset as it is; this and its warnings after preparing
+        self.triangles = 0  # of the asset as it is; this, its warnings and notes after preparing
         self.warnings: tuple[str, ...] = ()
+        self.notes: tuple[str, ...] = ()
 
     def prepare(self) -> Work[None]:
         """Reads the asset and prepares it as the reference.
@@ -120,7 +121,8 @@ class Search:
             yield from as_part(measurement.prepare(), number / len(rounds), 1 / len(rounds), "Preparing")
             self._measurements[quick] = measurement
         self._measurements.setdefault(True, measurement)
-        self.warnings = self._measurements[False].reference.warnings
+        surface = self._measurements[False].reference
+        self.warnings, self.notes = surface.warnings, surface.notes
 
     def ratios(self, max_triangles: int | None = None) -> list[Version]:
         """Versions with fewer and fewer triangles: TOLERANCE apart, or one triangle where that is more."""
@@ -269,12 +271,14 @@ class DecimationResult:
     """What was found for a goal, a result for each target.
 
     Attributes:
-        triangles: of the asset as it is. warnings: what should be known of it before scores are believed.
+        triangles: of the asset as it is. warnings: what should be known of it before scores are believed. notes: what
+            was done with it that misleads nobody.
     """
 
     results: tuple[TargetResult, ...]
     triangles: int
     warnings: tuple[str, ...]
+    notes: tuple[str, ...]
 
 
 def decimating(
@@ -311,7 +315,7 @@ def _decimating(search: Search, goal: DecimationGoal) -> Work[DecimationResult]:
             searching = search.find(goal.texture_target, versions, goal.judge)
             texture = yield from as_share(searching, first + share, share)
         results.append(TargetResult(geometry, texture))
-    return DecimationResult(tuple(results), search.triangles, search.warnings)
+    return DecimationResult(tuple(results), search.triangles, search.warnings, search.notes)
 
 
 def as_share(work: Work[T], first: float, share: float) -> Work[T]:

@@ -54,6 +54,11 @@ class Comparison(Readings):
         """What should be known before the scores are believed."""
         return (*self.result.warnings, *self.trust.warnings)
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was done with the meshes that misleads nobody."""
+        return self.result.notes
+
 
 class Measurement:
     """A reference, prepared once for any number of comparisons.

@@ -94,6 +94,11 @@ class PairResult:
         """What should be known before the scores are believed."""
         return (*self.alignment.warnings, *self.comparison.warnings)
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was done with the pair that misleads nobody."""
+        return (*self.alignment.notes, *self.comparison.notes)
+
 
 def measurement_of(reference: AssetMesh, build_query: QueryBuilder, options: PairOptions) -> Measurement:
     """The measurement of a reference, to be prepared once for all its pairs."""

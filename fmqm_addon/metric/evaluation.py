@@ -64,7 +64,7 @@ class Result:
         patches: the P patches, on patch_mesh. patch_centers: (P, 3) metric's frame.
         samples: N sample points. ref, dist: the fields of both surfaces there; metric's frame.
         frame: from the metric's frame to the reference's world.
-        warnings: what should be known before the scores are believed.
+        warnings: what should be known before the scores are believed. notes: what was done that misleads nobody.
     """
 
     settings: Settings
@@ -81,6 +81,7 @@ class Result:
     dist: Fields
     frame: Frame
     warnings: tuple[str, ...]
+    notes: tuple[str, ...]
 
     def of_patches(self, column: str) -> Floats:
         """(P,) one of COLUMNS or of perceived.PERCEIVED_COLUMNS."""
@@ -97,7 +98,7 @@ class _Prepared:
     samples: Samples
     order: Ints
     ref: Fields
-    warnings: tuple[str, ...]
+    notes: tuple[str, ...]
 
 
 class Evaluation:
@@ -141,17 +142,17 @@ class Evaluation:
         order = morton_order(samples.positions)
         yield Progress("prepare", 0.4)
 
-        warnings = list(self.reference.warnings)
+        notes = list(self.reference.notes)
         if mesh.was_split:
             before, after = len(self.reference.triangles), len(mesh.triangles)
-            warnings.append(
+            notes.append(
                 f"{self.reference.name}: {len(self.reference.vertices)} vertices are too few for {settings.patches} "
                 f"patches; edges were split for them ({before} to {after} triangles, same surface)"
             )
         reach = np.abs(samples.offset)  # a sample is this near to the face it was drawn on
         fields = evaluate_fields(self.reference, samples.positions, order, reach)
         ref = yield from as_work(fields, "fields", 0.4, 1.0)
-        self._prepared = _Prepared(mesh, tuple(patches), mesh.vertices[centers], samples, order, ref, tuple(warnings))
+        self._prepared = _Prepared(mesh, tuple(patches), mesh.vertices[centers], samples, order, ref, tuple(notes))
 
     def _compare(self, prepared: _Prepared, distorted: Surface) -> Work[Result]:
         settings, samples = self.settings, prepared.samples
@@ -194,7 +195,8 @@ class Evaluation:
             ref=prepared.ref,
             dist=dist,
             frame=self.reference.frame,
-            warnings=prepared.warnings + tuple(w for w in distorted.warnings if w not in prepared.warnings),
+            warnings=tuple(dict.fromkeys((*self.reference.warnings, *distorted.warnings))),
+            notes=tuple(dict.fromkeys((*prepared.notes, *distorted.notes))),
         )
 
 

@@ -132,7 +132,7 @@ class Surface:
         triangles: (T, 3) int64; none is degenerate, none repeats another.
         corners: (T, 3, K) float64, finite; material: (T,) int64; materials: as in MeshArrays.
         source: (T,) int64, the row of each triangle in MeshArrays.
-        preparation: what was left out and welded.
+        preparation: what was left out and welded. warnings, notes: as in MeshArrays, and what preparing adds to them.
     """
 
     name: str
@@ -146,6 +146,7 @@ class Surface:
     query: SurfaceQuery
     preparation: Preparation
     warnings: tuple[str, ...]
+    notes: tuple[str, ...]
 
     def color_at(self, triangle: Ints, barycentric: Floats) -> Floats:
         """Equations (5) to (7): (N, 3) float64 sRGB colors at barycentric (N, 3) places of (N,) triangles."""
@@ -205,21 +206,21 @@ def preparing_surface(
     Raises:
         MeshError: no usable triangle is left.
     """
-    warnings = list(mesh.warnings)
+    warnings, notes = list(mesh.warnings), list(mesh.notes)
     triangles = np.asarray(mesh.triangles, np.int64).reshape(-1, 3)
     if not len(triangles):
         raise MeshError(f"{mesh.name}: the mesh has no faces; a surface is wanted")
     source = np.arange(len(triangles))
 
-    def keep(mask: NDArray[np.bool_], why: str) -> int:
-        """Leaves out the others; returns how many they are."""
+    def keep(mask: NDArray[np.bool_], why: str, say: list[str]) -> int:
+        """Leaves out the others, and says so; returns how many they are."""
         nonlocal triangles, source
         dropped = len(mask) - int(np.count_nonzero(mask))
         if not dropped:
             return 0
         if dropped == len(mask):
             raise MeshError(f"{mesh.name}: all {len(mesh.triangles)} triangles are unusable; the last {dropped} {why}")
-        warnings.append(f"{mesh.name}: {dropped} of {len(mesh.triangles)} triangles left out: they {why}")
+        say.append(f"{mesh.name}: {dropped} of {len(mesh.triangles)} triangles left out: they {why}")
         triangles, source = triangles[mask], source[mask]
         return dropped
 
@@ -227,7 +228,7 @@ def preparing_surface(
     world = np.asarray(mesh.positions, np.float64)
     if not np.isfinite(world).all():
         finite = np.isfinite(world).all(axis=1)
-        not_finite = keep(finite[triangles].all(axis=1), "have coordinates that are not finite")
+        not_finite = keep(finite[triangles].all(axis=1), "have coordinates that are not finite", warnings)
     yield 0.1
     world, triangles = _used_only(world, triangles)
     if frame is None:
@@ -236,9 +237,9 @@ def preparing_surface(
     positions, triangles = weld(frame.enter(world), triangles)
     welded = len(world) - len(positions)
     yield 0.4
-    flat = keep(~_is_flat(positions, triangles, frame), "have zero area")
+    flat = keep(~_is_flat(positions, triangles, frame), "have zero area", notes)
     yield 0.5
-    repeated = keep(_is_first(triangles), "repeat another triangle")
+    repeated = keep(_is_first(triangles), "repeat another triangle", notes)
     yield 0.6
     vertices, triangles = _used_only(positions, triangles)
 
@@ -260,6 +261,7 @@ def preparing_surface(
         query=build_query(vertices, triangles),
         preparation=Preparation(len(mesh.triangles), not_finite, flat, repeated, welded),
         warnings=tuple(warnings),
+        notes=tuple(notes),
     )
 
 

@@ -146,6 +146,14 @@ def trust_parts(records: Iterable[Mapping[str, Any]]) -> Iterator[str]:
             yield f"\n{names}\n{trust_text(record['trust'])}"
 
 
+def note_parts(records: Iterable[Mapping[str, Any]]) -> Iterator[str]:
+    """The notes of all records, each once."""
+    notes = dict.fromkeys(note for record in records for note in record["notes"])
+    yield from (f"\n{one_line(f'note: {note}')}" for note in notes)
+    if notes:
+        yield "\n"
+
+
 def pair_record(pair: PairScore) -> dict[str, Any]:
     """A pair as plain values for JSON, by which all outputs are made; its id is the name of what was scored."""
     return {

@@ -31,7 +31,7 @@ from tests.blender.script import (
 )
 
 PAIR_KEYS = [
-    "id", "reference", "distorted", *COLUMNS, "stderr", "patches", "samples", "seconds", "warnings", "error",
+    "id", "reference", "distorted", *COLUMNS, "stderr", "patches", "samples", "seconds", "warnings", "notes", "error",
     "reverse", "trust", "ref_texture", "texture", "settings", "fail_under",
 ]  # fmt: skip
 SETTING_FLAGS = [
@@ -454,11 +454,11 @@ def test_one_texture_for_all(assets: Path, tmp_path: Path) -> None:
     assert [numbers(pair) for pair in read_json(tmp_path / "j")["pairs"]] == [[1.0] * 5] * 3
 
 
-def test_without_an_image_there_is_a_warning(assets: Path, tmp_path: Path) -> None:
+def test_without_an_image_there_is_a_note(assets: Path, tmp_path: Path) -> None:
     done = score("ref.obj", "bare.obj", *SMALL, "--json", tmp_path / "j", "--quiet", cwd=assets)
     assert done.returncode == 0
-    (warning,) = read_json(tmp_path / "j")["pairs"][0]["warnings"]
-    assert "bare" in warning and "grey" in warning and warning in one_line(done.stderr)
+    (pair,) = read_json(tmp_path / "j")["pairs"]
+    assert any("bare" in note and "grey" in note for note in pair["notes"]) and "grey" not in done.stderr
 
 
 def test_bake_lets_a_missing_image_be_magenta(assets: Path, tmp_path: Path) -> None:
@@ -487,7 +487,7 @@ def test_bake_sets_the_size_or_forbids_it(tmp_path: Path) -> None:
         assert numbers(pair) == [1.0] * 5
         assert pair["trust"]["reference"]["colors_from"]["value"] == {"Marbled": how}
         assert pair["trust"]["pair"]["baked_at"]["value"] == size
-        assert any("Marbled" in warning for warning in pair["warnings"])
+        assert any("Marbled" in text for text in pair["warnings" if how == "plain" else "notes"])
 
 
 @pytest.mark.parametrize("limit", [("--max-image-side", 15), ("--max-image-bytes", 1023)])

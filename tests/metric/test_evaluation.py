@@ -426,9 +426,9 @@ def test_more_distortion_scores_less(amounts: tuple[float, ...]) -> None:
 # --- warnings, frames and the stepper ---------------------------------------------------------------------
 
 
-def test_warnings_name_what_was_done() -> None:
+def test_warnings_and_notes_name_what_was_done() -> None:
     split = evaluate(textured("triangle"), textured("triangle"))
-    assert any("3 vertices are too few for 10 patches" in warning for warning in split.warnings)
+    assert any("3 vertices are too few for 10 patches" in note for note in split.notes) and not split.warnings
     loose = evaluate(textured("loose parts"), textured("loose parts"), Settings(samples=640, patches=1))
     assert [patch.extended for patch in loose.patches] == [True] and not loose.warnings
     assert evaluate(*pair()).warnings == ()
@@ -436,14 +436,14 @@ def test_warnings_name_what_was_done() -> None:
     broken = replace(distorted, triangles=np.concatenate([distorted.triangles[:-1], [[0, 0, 1]]]), warnings=("seen",))
     result = evaluate(replace(reference, warnings=("seen",)), broken)
     assert [warning for warning in result.warnings if warning == "seen"] == ["seen"]
-    assert any(warning.startswith("dist: 1 of 80 triangles") for warning in result.warnings)
+    assert any(note.startswith("dist: 1 of 80 triangles") for note in result.notes)
 
 
 @pytest.mark.parametrize(("patches", "scored", "split"), [(12, None, False), (12, 40, False), (13, 1, True)])
 def test_all_patches_must_find_a_vertex_and_not_the_scored_ones(patches: int, scored: int | None, split: bool) -> None:
     mesh = textured("icosahedron")
     result = evaluate(mesh, mesh, Settings(samples=640, patches=patches, scored_patches=scored))
-    assert result.patch_mesh.was_split == split == bool(result.warnings)
+    assert result.patch_mesh.was_split == split == bool(result.notes)
 
 
 def test_the_distorted_surface_must_share_the_frame() -> None:

@@ -87,8 +87,15 @@ def test_what_cannot_be_measured_is_left_out_and_counted() -> None:
     prepared = prepare_surface(plain(positions, triangles), NaiveQuery)
     assert prepared.source.tolist() == [0, 7]
     assert len(prepared.vertices) == 4, "unused vertices are not part of the surface"
-    assert [re.findall(r"\d+", warning) for warning in prepared.warnings] == [["2", "8"], ["3", "8"], ["1", "8"]]
-    assert all(warning.startswith("thing: ") for warning in prepared.warnings)
+    assert [re.findall(r"\d+", warning) for warning in (*prepared.warnings, *prepared.notes)] == [
+        ["2", "8"],
+        ["3", "8"],
+        ["1", "8"],
+    ]
+    assert (
+        all(text.startswith("thing: ") for text in (*prepared.warnings, *prepared.notes))
+        and len(prepared.warnings) == 1
+    )
     corners = prepared.frame.leave(prepared.vertices)[prepared.triangles]
     np.testing.assert_allclose(corners, positions[triangles[[0, 7]]], atol=1e-15)
 

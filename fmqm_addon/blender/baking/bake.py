@@ -238,8 +238,8 @@ def _look(
         images=unread.images,
         uv=0 if layout.own else None,
     )
-    warning = f"material {material.name}: {unread.node} {unread.why}; baked at {layout.side} x {layout.side}"
-    return Look(made, (MeshLayer("uv", ""),), (warning, *unread.warnings))
+    note = f"material {material.name}: {unread.node} {unread.why}; baked at {layout.side} x {layout.side}"
+    return Look(made, (MeshLayer("uv", ""),), unread.warnings, (note, *unread.notes))
 
 
 def _encode(colors: NDArray[np.float32], weights: NDArray[np.float32] | None) -> None:

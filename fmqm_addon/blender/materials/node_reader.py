@@ -87,6 +87,7 @@ class MaterialReader:
     ) -> None:
         self.layers: list[MeshLayer] = []
         self.warnings: list[str] = []
+        self.notes: list[str] = []
         self._name = material.name
         self._surface = surface
         self._cache = cache
@@ -246,7 +247,7 @@ class MaterialReader:
         if node.attribute_name:
             return VertexColor(self.channel(MeshLayer("color", node.attribute_name)))
         text = f"material {self._name}: {node.name} names no attribute; it is black, as Blender renders it"
-        self.warnings.append(text)
+        self.notes.append(text)
         return None
 
     def check_images(self) -> None:

@@ -41,7 +41,9 @@ def _read_look(material: bpy.types.Material | None, cache: TextureCache, reading
         return Look(given, (MeshLayer("uv", ""),), black_warnings("the image that is given", reading.texture.pixels))
     if material is None:
         grey = plain_color((DEFAULT_GREY,) * 3)
-        return Look(Material("", grey, how="none"), (), ("there is no material; Blender's default grey is taken",))
+        return Look(
+            Material("", grey, how="none"), (), notes=("there is no material; Blender's default grey is taken",)
+        )
     surface = surface_of(material)
     if surface is None:
         why = "has no shader" if uses_nodes(material) else "does not use nodes"
@@ -58,10 +60,15 @@ def _read_look(material: bpy.types.Material | None, cache: TextureCache, reading
     except NotReadError as error:
         if reading.bake:
             reader.check_images()
-        return Unread(error.node, error.why, used_images(material, cache), tuple(dict.fromkeys(reader.warnings)))
+        return Unread(error.node, error.why, used_images(material, cache), *_said(reader))
     uv = next((reader.channel(layer) for layer in reader.layers if layer.kind == "uv"), None)
     made = Material(material.name, color, alpha, "read", used_images(material, cache), uv)
-    return Look(made, tuple(reader.layers), tuple(dict.fromkeys(reader.warnings)))
+    return Look(made, tuple(reader.layers), *_said(reader))
+
+
+def _said(reader: MaterialReader) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Warnings and notes, each once."""
+    return tuple(dict.fromkeys(reader.warnings)), tuple(dict.fromkeys(reader.notes))
 
 
 def plain_look(material: bpy.types.Material, warning: str) -> Look:

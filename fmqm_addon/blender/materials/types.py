@@ -76,20 +76,23 @@ class Look:
     Attributes:
         material: its samplers read the channels of MeshArrays.corners, layer after layer in the order of layers.
         layers: what the mesh must offer.
-        warnings: what was assumed; they name the material.
+        warnings: what was assumed, so that a score may mislead. notes: what was done that misleads nobody. Both name
+            the material.
     """
 
     material: Material
     layers: tuple[MeshLayer, ...]
     warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Unread:
     """A material that must be baked: the node that is not read, what about it (a verb phrase), the images that are
-    used, and what was assumed of them."""
+    used, and what is to be said of them, as of a Look."""
 
     node: str
     why: str
     images: tuple[ImageFacts, ...] = ()
     warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()

@@ -93,6 +93,11 @@ class Outcome:
         """What should be known before the scores are believed."""
         return () if self.pair_result is None else self.pair_result.warnings
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was done with the pair that misleads nobody."""
+        return () if self.pair_result is None else self.pair_result.notes
+
 
 def measuring(
     reference: Target,

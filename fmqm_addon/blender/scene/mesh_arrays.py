@@ -103,7 +103,8 @@ def mesh_arrays(
     if space != _WORKING_SPACE:
         warnings.append((name, f"the file's working space is {space}; its colors are taken as {_WORKING_SPACE}"))
     joined = join_meshes([moved(parts[instance.shape], instance.matrix) for instance in instances], one_line(name))
-    return replace(joined, warnings=_joined_warnings(warnings))
+    notes = [(instance.name, note) for instance in instances for note in parts[instance.shape].notes]
+    return replace(joined, warnings=_joined(warnings), notes=_joined(notes))
 
 
 def _left_out(objects: Sequence[Evaluated]) -> list[tuple[str, str]]:
@@ -279,7 +280,7 @@ def _read_slot(
 
 
 def _as_arrays(shape: _Shape, reading: Reading) -> MeshArrays:
-    """The shape in its own coordinates; neither it nor its warnings have a name."""
+    """The shape in its own coordinates; neither it nor its warnings and notes have a name."""
     resolved = _resolved(shape, reading)
     material = np.zeros(len(shape.triangles), np.int32)
     if len(shape.slots) == 1:
@@ -300,6 +301,7 @@ def _as_arrays(shape: _Shape, reading: Reading) -> MeshArrays:
         material=material,
         materials=tuple(look.material for look in looks),
         warnings=(*(warning for look in looks for warning in look.warnings), *of_slots),
+        notes=tuple(note for look in looks for note in look.notes),
     )
 
 
@@ -359,12 +361,12 @@ def _relative(matrix: Floats, frame: Floats | None, name: str) -> Floats:
         raise MeshError(f"{name}: its parent has a scale of zero; mend that transform") from error
 
 
-def _joined_warnings(warnings: Iterable[tuple[str, str]]) -> tuple[str, ...]:
-    """Names and what is to be said of them as warnings: what many share is said once."""
+def _joined(said: Iterable[tuple[str, str]]) -> tuple[str, ...]:
+    """Names and what is to be said of them as warnings or notes: what many share is said once."""
     names: dict[str, dict[str, None]] = {}
-    for name, warning in warnings:
-        names.setdefault(warning, {})[name] = None
-    return tuple(one_line(f"{_listed(list(those))}: {warning}") for warning, those in names.items())
+    for name, text in said:
+        names.setdefault(text, {})[name] = None
+    return tuple(one_line(f"{_listed(list(those))}: {text}") for text, those in names.items())
 
 
 def _listed(names: list[str]) -> str:

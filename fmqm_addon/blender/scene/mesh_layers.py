@@ -64,7 +64,7 @@ def rows_by_slot(mesh: bpy.types.Mesh, cut: Triangles) -> dict[int, Rows]:
 
 def look_on_mesh(mesh: bpy.types.Mesh, look: Look) -> Look | Unread:
     """A look, or what the baker has to make of it on this mesh."""
-    known = look.material.images, look.warnings
+    known = look.material.images, look.warnings, look.notes
     for layer in look.layers:
         if _layer_of(mesh, layer) is not None:
             continue

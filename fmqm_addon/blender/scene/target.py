@@ -150,8 +150,12 @@ def _without_modifiers(
         duplicate.modifiers.clear()
         others = [each for each in family if each != object_]
         result = asset_mesh([duplicate, *others], label, reading, duplicate, cache)
-        warnings = tuple(w.replace(duplicate.name, object_.name, 1) for w in result.mesh.warnings)
-        return replace(result, mesh=replace(result.mesh, warnings=warnings))
+        found = result.mesh
+        warnings, notes = (
+            tuple(text.replace(duplicate.name, object_.name, 1) for text in texts)
+            for texts in (found.warnings, found.notes)
+        )
+        return replace(result, mesh=replace(found, warnings=warnings, notes=notes))
     except MeshError as error:
         raise MeshError(str(error).replace(duplicate.name, object_.name)) from error
     finally:

@@ -49,6 +49,9 @@ def pair_card(number: int, record: Record, name: str) -> str:
             f"{_attribution(record.get('attribution'))}"
             f"<h4>Perceived and its features</h4>{_numbers(record, PERCEIVED)}</div>{close_ups}</div>"
         )
+    if record["notes"]:
+        items = "".join(f"<li>{text(note)}</li>" for note in record["notes"])
+        parts.append(f"<details><summary>Notes</summary><ul>{items}</ul></details>")
     if record.get("trust"):
         parts.append(_trust(record["trust"]))
     return f'<article class="card" id="pair-{number}">{"".join(parts)}</article>\n'

@@ -155,7 +155,7 @@ def test_gradient_at_every_place(uv: bool) -> None:
     seen = look_at(object_, found)
     assert np.abs(seen.color - of_gradient(seen.position)).max() < CLOSE
     assert found.look.material.how == "baked" and found.look.material.alpha is None
-    assert found.look.warnings == ("material Gradient: Noise Texture is not read; baked at 256 x 256",)
+    assert found.look.notes == ("material Gradient: Noise Texture is not read; baked at 256 x 256",)
     assert len(found.look.layers) == 1 and found.look.layers[0].kind == "uv"
 
 
@@ -743,7 +743,7 @@ def test_meshes_are_baked_where_they_cannot_be_read() -> None:
     object_.data.polygons[3].material_index = 1
     arrays = mesh_arrays([object_], "asset", Reading(bake=128))
     assert [each.how for each in arrays.materials] == ["baked", "read"]
-    assert [warning for warning in arrays.warnings if "Rust" in warning and "baked at 128 x 128" in warning]
+    assert [note for note in arrays.notes if "Rust" in note and "baked at 128 x 128" in note]
     surface = prepare_surface(arrays, BVHQuery)
     rng = np.random.default_rng(0)
     triangle, place = rng.integers(0, 12, 500), rng.dirichlet((1, 1, 1), 500)

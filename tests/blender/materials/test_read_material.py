@@ -116,9 +116,9 @@ def test_sockets_that_are_not_finite_give_finite_colors(strange: float) -> None:
     assert np.isfinite(rgb).all() and (rgb >= 0).all() and (rgb <= 1).all()
 
 
-def test_no_material_is_default_grey_with_a_warning() -> None:
+def test_no_material_is_default_grey_with_a_note() -> None:
     seen = look(None)
-    assert seen.material.how == "none" and len(seen.warnings) == 1
+    assert seen.material.how == "none" and len(seen.notes) == 1
     assert seen.material.color.rgb == pytest.approx((0.906332,) * 3, abs=1e-5)  # 0.8 encoded
 
 
@@ -315,12 +315,12 @@ def test_missing_image_between_a_shader_and_a_transparent_one_is_opaque(
     assert [(image.role, image.missing) for image in seen.material.images] == [("alpha", True)]
 
 
-def test_attribute_without_a_name_is_black_with_a_warning() -> None:
+def test_attribute_without_a_name_is_black_with_a_note() -> None:
     material = scenes.material("Bare")
     behind(material, "Attribute")
     seen = look(material)
     assert seen.material.color.rgb == (0, 0, 0) and seen.layers == ()
-    assert seen.warnings == ("material Bare: Attribute names no attribute; it is black, as Blender renders it",)
+    assert seen.notes == ("material Bare: Attribute names no attribute; it is black, as Blender renders it",)
 
 
 def test_plain_look_is_the_shader_s_own_color(tmp_path: Path) -> None:

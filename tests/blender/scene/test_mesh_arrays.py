@@ -176,11 +176,11 @@ def test_face_of_a_negative_slot_has_the_first() -> None:
 
 
 @pytest.mark.parametrize("materials", [[], [None]], ids=["no slot", "empty slot"])
-def test_without_material_default_grey_and_a_warning(materials: list[None]) -> None:
+def test_without_material_default_grey_and_a_note(materials: list[None]) -> None:
     arrays = mesh_arrays([scenes.square("Bare", uv=False, materials=materials)], "asset")
     grey = 1.055 * 0.8 ** (1 / 2.4) - 0.055
     assert arrays.materials[0].color.rgb == pytest.approx((grey,) * 3)
-    assert len(arrays.warnings) == 1 and "Bare" in arrays.warnings[0] and "grey" in arrays.warnings[0]
+    assert len(arrays.notes) == 1 and "Bare" in arrays.notes[0] and "grey" in arrays.notes[0]
 
 
 def test_the_given_texture_replaces_all_materials() -> None:
@@ -283,7 +283,7 @@ def test_hidden_object_is_named_as_the_user_knows_it() -> None:
         mesh_arrays([object_], "asset", GIVEN)
     bare = scenes.cube("Bare")
     off_in_viewports(bare)
-    assert mesh_arrays([bare], "asset").warnings[0].startswith("Bare: ")
+    assert mesh_arrays([bare], "asset").notes[0].startswith("Bare: ")
 
 
 @pytest.mark.parametrize("fails", [False, True], ids=["measured", "refused"])
@@ -387,7 +387,7 @@ def test_alpha_of_an_attribute_that_the_mesh_lacks_is_baked(kind: str, opacity: 
     object_ = scenes.square(materials=[made])
     assert to_bake([object_], Reading(bake=64), TextureCache()) == ("Painted",)
     arrays = mesh_arrays([object_], "asset", Reading(bake=64))
-    assert any("the color attribute tint is missing on the mesh; baked" in warning for warning in arrays.warnings)
+    assert any("the color attribute tint is missing on the mesh; baked" in note for note in arrays.notes)
     found = prepare_surface(arrays, BVHQuery).alpha_at(np.arange(2), np.full((2, 3), 1 / 3))
     assert found == pytest.approx(opacity)
 

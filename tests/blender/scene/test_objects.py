@@ -311,7 +311,7 @@ def test_instances_of_geometry_nodes(hidden: bool) -> None:
     assert len(arrays.triangles) == 2 + 4 * (2 + 12)
     share = {look.name: np.count_nonzero(arrays.material == row) for row, look in enumerate(arrays.materials)}
     assert share == {"Red": 2, "Blue": 4 * 12, "": 4 * 2}
-    assert [warning.partition(":")[0] for warning in arrays.warnings] == ["Source"]
+    assert [note.partition(":")[0] for note in arrays.notes] == ["Source"]
 
 
 def test_many_instances_share_what_they_can() -> None:
@@ -556,7 +556,7 @@ def test_many_objects_without_material_say_so_once(tmp_path: Path) -> None:
     scenes.clear()
     arrays = load_mesh(str(path))
     assert len(arrays.triangles) == 35 * 12
-    assert arrays.warnings == ("Part 00, Part 01 and 33 more: there is no material; Blender's default grey is taken",)
+    assert arrays.notes == ("Part 00, Part 01 and 33 more: there is no material; Blender's default grey is taken",)
 
 
 UP = {
