@@ -176,6 +176,7 @@ class _Scorer:
             costs=_costs(answer),
             reverse=answer.reverse,
             trust=trust_dict(comparison.trust),
+            parts=tuple(part.as_dict() for part in comparison.trust.parts),
             findings=self._findings(row, answer),
         )
 

@@ -135,7 +135,12 @@ def build_parser(program: str) -> OneLineParser:
         "--fail-under-p10", type=float, metavar="X",
         help="exit code 1 if the 10th percentile over a pair's patches is below X: its worst places",
     )  # fmt: skip
-    output.add_argument("--verbose", action="store_true", help="how far to trust each score: the facts, in a table")
+    output.add_argument(
+        "--parts", action="store_true", help="each object, material and connected part: its scores, and which are gone"
+    )
+    output.add_argument(
+        "--verbose", action="store_true", help="how far to trust each score: the facts, in a table; and notes"
+    )
     output.add_argument("--quiet", action="store_true", help="no progress on stderr")
     return parser
 

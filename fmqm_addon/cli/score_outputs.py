@@ -12,9 +12,10 @@ from ..batch.progress_log import Log
 from ..comparison.judge import Judge
 from ..report.atomic_files import STDOUT, check_apart, print_parts, write_parts
 from ..report.criteria import below, shortfall
-from ..report.explain import explain
+from ..report.explain import explain, footnote
 from ..report.html.page import write_page
 from ..report.junit import junit_parts
+from ..report.parts_table import parts_parts
 from ..report.records import csv_parts, json_parts, note_parts, table_parts, trust_parts
 from .process import FAILED, OK
 from .score_arguments import output_files, page_file, shard_of
@@ -69,10 +70,13 @@ def _table_parts(args: argparse.Namespace, records: Iterable[Mapping[str, Any]])
     if args.verbose:
         yield from trust_parts(records)
         yield from note_parts(records)
+    if args.parts:
+        yield from parts_parts(records)
     if args.explain:
         for record in records:
             # A pair without scores of its own process, such as a lost one, comes without an explanation.
             yield f"\n{record.get('explanation') or explain(record)}\n"
+        yield f"\n{footnote(records)}\n"
 
 
 def _images(records: Iterable[Mapping[str, Any]]) -> Iterator[str]:

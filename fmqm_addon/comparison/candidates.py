@@ -55,7 +55,8 @@ class Candidate:
 
 def moved(mesh: MeshArrays, matrix: Floats) -> MeshArrays:
     """The mesh with a (4, 4) matrix applied."""
-    return replace(mesh, positions=transformed(mesh.positions, matrix))
+    scale = float(np.linalg.norm(matrix[:3, :3], axis=0).max())
+    return replace(mesh, positions=transformed(mesh.positions, matrix), rounding=mesh.rounding * scale)
 
 
 def unit_factor(box: Floats, target: Floats) -> float:

@@ -15,6 +15,7 @@ from ..metric.perceived import Perceived
 from ..metric.settings import Settings
 from ..metric.stepper import Progress, Stepper, Work, as_part, as_work
 from ..metric.surface import MeshArrays, QueryBuilder, Surface, preparing_surface
+from .parts import Grouping, groupings
 from .surface_facts import Fact, surface_facts
 from .trust import Trust, assessing
 
@@ -57,7 +58,7 @@ class Comparison(Readings):
     @property
     def notes(self) -> tuple[str, ...]:
         """What was done with the meshes that misleads nobody."""
-        return self.result.notes
+        return (*self.result.notes, *self.trust.notes)
 
 
 class Measurement:
@@ -74,7 +75,9 @@ class Measurement:
         self._settings = settings
         self._repeats = repeats
         self._evaluations: list[Evaluation] = []
-        self._facts: tuple[Fact, ...] = ()  # of the reference, from the first comparison on
+        # Of the reference, from the first comparison on.
+        self._facts: tuple[Fact, ...] = ()
+        self._groups: tuple[Grouping, ...] = ()
 
     @property
     def reference(self) -> Surface:
@@ -112,8 +115,9 @@ class Measurement:
     def _compare(self, distorted: MeshArrays, known: Sequence[Fact]) -> Work[Comparison]:
         surface, results = yield from self._results(distorted, 0.0, 0.92)
         if not self._facts:
-            self._facts = yield from as_work(surface_facts(self.reference), "features", 0.92, 0.96)
-        assessed = assessing(self.reference, surface, results[0], self._facts)
+            self._facts = yield from as_work(surface_facts(self.reference), "features", 0.92, 0.95)
+            self._groups = yield from as_work(groupings(self.reference), "features", 0.95, 0.96)
+        assessed = assessing(self.reference, surface, results[0], self._facts, self._groups)
         trust = yield from as_work(assessed, "features", 0.96, 1.0)
         readings = _means(results)
         return Comparison(

@@ -10,32 +10,33 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..metric.evaluation import Result
 from ..metric.fields import Fields, closest_on
-from ..metric.geometry import Floats, dot, morton_order
-from ..metric.surface import Surface, triangle_areas, triangle_normals
-from ..metric.texture import MISSING
+from ..metric.geometry import Floats, dot
+from ..metric.surface import Surface, triangle_normals
+from ..metric.texture import MISSING, ImageFacts, Material
+from .color_shift import color_shifts
+from .distances import POINTS, Apart, apart
+from .doubts import doubts
+from .parts import Grouping, Part, groupings, parts_report
 from .surface_facts import NO_MATERIAL, Fact, Work, all_images, box_of, surface_facts
-
-# What should stop someone from believing the number. Shares.
-SIGN_IN_DOUBT = 0.01  # of samples whose side is doubtful on one mesh and not the same on both: the SDF's sign is noise
-LEAST_COVERED = 0.6  # of the reference's area; the gaps between round patches alone leave out up to 0.25 (measured)
-FLIPPED = 0.01  # of samples; a renderer that culls back faces shows holes there
-ADDED = 0.005  # of the distorted mesh's area; floating junk that the score leaves out
-MAGENTA = 0.01  # of samples; images or tiles of UDIM sets are missing there
-UV_MISSING = 0.01  # of the textured area; it is painted with a single pixel
 
 FLIPPED_COSINE = -0.5  # between the faces nearest to a sample, which noise and decimation turn by less. The metric
 # squares cosines and cannot see it
 ADDED_DISTANCE = 0.1  # of the median patch diagonal: far beyond what an LOD moves its surface
-ADDED_POINTS = 20_000  # over the distorted mesh; a share of 0.5 % is known to 0.05 %
+POINTS_SHARE, LEAST_POINTS = 10, 2000  # points spread over each mesh: a tenth of the samples, at least so many
+WIDE = 0.5  # of the reference's box diagonal
 OPAQUE = 0.5  # a lower alpha is see-through
+COLOR_UNIT = "CIE 1976 difference, 2.3 is just noticeable"
 _SEEN = 1 << 14  # samples of a step
-_BATCH = 2048  # nearest points of a step
+_SEEN_ROLES = {"base color", "alpha"}
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -44,59 +45,111 @@ class Trust:
 
     Attributes:
         reference, distorted: of the meshes. pair: of the two together.
-        warnings: the few that should stop someone from believing the score.
+        parts: scores of the reference's parts, and which of them are gone.
+        warnings: the few that should stop someone from believing the score. notes: what is good to know.
     """
 
     reference: tuple[Fact, ...]
     distorted: tuple[Fact, ...]
     pair: tuple[Fact, ...]
+    parts: tuple[Part, ...]
     warnings: tuple[str, ...]
+    notes: tuple[str, ...]
 
 
-def assessing(reference: Surface, distorted: Surface, result: Result, known: Sequence[Fact]) -> Work[Trust]:
+def assessing(
+    reference: Surface,
+    distorted: Surface,
+    result: Result,
+    known: Sequence[Fact],
+    groups: Sequence[Grouping] | None = None,
+) -> Work[Trust]:
     """All facts of a comparison; yields the share done.
 
     Args:
-        known: surface_facts of the reference, which serve all its comparisons.
+        known: surface_facts of the reference. groups: groupings of it. They serve all its comparisons; None: made here.
     """
     own = yield from surface_facts(distorted)
-    yield 0.4
+    yield 0.3
+    if groups is None:
+        groups = yield from _shares(groupings(reference), 0.3, 0.1)
     compared = ((reference, result.ref), (distorted, result.dist))
     normals = []
     for surface, fields in compared:
         normals.append(triangle_normals(surface.vertices, surface.triangles.take(fields.triangle, axis=0)))
-        yield 0.5
+        yield 0.4
     doubtful = [
         in_doubt(fields, result.samples.positions, normal)
         for (_, fields), normal in zip(compared, normals, strict=True)
     ]
     differs = (result.ref.sdf < 0) != (result.dist.sdf < 0)
-    yield 0.6
-    see_through = []
+    yield 0.4
+    alphas = []
     for surface, fields in compared:
-        see_through.append((yield from _see_through(surface, fields)))
+        alphas.append((yield from _alphas(surface, fields)))
+    lost, gained = ((alphas[k] < OPAQUE) & (alphas[1 - k] >= OPAQUE) for k in (0, 1))
     reach = ADDED_DISTANCE * float(np.median([patch.diagonal for patch in result.patches]))
-    added = yield from added_share(reference, distorted, reach, result.settings.seed)
+    seed, count = result.settings.seed, min(POINTS, max(LEAST_POINTS, len(result.samples.positions) // POINTS_SHARE))
+    moved = result.ref.nearest - result.dist.nearest  # by more than reach: what it faced is gone
+    there = yield from _shares(apart(reference, distorted, reach, seed, count), 0.5, 0.2)
+    back = yield from _shares(apart(distorted, reference, reach, seed, count), 0.7, 0.2)
+    parts = yield from _shares(parts_report(groups, reference, distorted, result), 0.9, 0.1)
+    shifts = color_shifts(result)
     sides = [
         (
             Fact("sign_in_doubt", _share(doubt), "share of samples"),
             Fact("samples_by_material", _samples_by_material(surface, fields), "share of samples"),
-            Fact("see_through", share, "share of samples"),
+            Fact("see_through", _share(alpha < OPAQUE), "share of samples"),
+            Fact("alpha_zero", _alpha_zero(surface, fields, alpha), "materials whose alpha is 0 everywhere"),
             Fact("magenta", _magenta_share(surface, fields), "share of samples"),
+            Fact("rounding", surface.rounding, "share of the reference's box diagonal"),
+            Fact("collapsed", _collapsed(surface), "share of triangles"),
         )
-        for (surface, fields), doubt, share in zip(compared, doubtful, see_through, strict=True)
+        for (surface, fields), doubt, alpha in zip(compared, doubtful, alphas, strict=True)
     ]
+    scale = result.frame.scale
+    maps_lost, maps_added = one_sided_maps(reference, distorted), one_sided_maps(distorted, reference)
     pair = (
         *_patch_facts(result),
+        *_width_facts(result),
         Fact("sign_in_doubt_and_different", _share((doubtful[0] | doubtful[1]) & differs), "share of samples"),
-        Fact("flipped", _share(dot(*normals) < FLIPPED_COSINE), "share of samples"),
-        Fact("added", added, "share of the distorted mesh's area"),
-        Fact("added_beyond", reach * result.frame.scale, "scene units"),
+        Fact(
+            "flipped",
+            _share((dot(*normals) < FLIPPED_COSINE) & (dot(moved, moved) < reach * reach)),
+            "share of samples",
+        ),
+        Fact("color_shift", float(shifts.mean()), COLOR_UNIT),
+        Fact("color_shift_largest", float(shifts.max()), f"{COLOR_UNIT}, of a patch"),
+        Fact("transparency_lost", _share(lost), "share of samples"),
+        Fact("transparency_gained", _share(gained), "share of samples"),
+        Fact("missing", there.beyond, "share of the reference's area"),
+        Fact("missing_parts", list(parts.missing), "parts of the reference"),
+        Fact("missing_parts_count", parts.missing_count, "parts"),
+        Fact("added", back.beyond, "share of the distorted mesh's area"),
+        Fact("added_beyond", reach * scale, "scene units"),
+        *_distance_facts("distance_to_distorted", there, scale, _diagonal(reference)),
+        *_distance_facts("distance_to_reference", back, scale, _diagonal(reference)),
         Fact("size", _diagonal(distorted) / _diagonal(reference), "of the reference's box diagonal"),
+        Fact("triangle_ratio", len(distorted.triangles) / len(reference.triangles), "times the reference's"),
+        _images_fact(same_images(reference, distorted)),
+        Fact("maps_lost", maps_lost, "maps that only the reference has"),
+        Fact("maps_added", maps_added, "maps that only the distorted mesh has"),
         Fact("maps_not_seen", differing_maps(reference, distorted), "maps that differ"),
     )
     facts = ((*known, *sides[0]), (*own, *sides[1]))
-    return Trust(*facts, pair, _warnings(reference.name, distorted.name, result, facts, pair))
+    warnings, notes = doubts((reference.name, distorted.name), result, facts, pair)
+    return Trust(*facts, pair, parts.parts, warnings, notes)
+
+
+def _shares(work: Work[T], first: float, share: float) -> Work[T]:
+    """Work as a part of larger work."""
+    while True:
+        try:
+            done = next(work)
+        except StopIteration as end:
+            result: T = end.value
+            return result
+        yield first + share * done
 
 
 def in_doubt(fields: Fields, points: Floats, normals: Floats) -> NDArray[np.bool_]:
@@ -118,49 +171,51 @@ def covered_share(result: Result) -> float:
     return float(min(result.patch_mesh.areas[covered].sum() / result.patch_mesh.area, 1.0))
 
 
-def spread_points(surface: Surface, count: int, seed: int) -> Floats:
-    """(count, 3) points on a surface, even over its area: one drawn in each of count equal shares of it."""
-    areas = np.cumsum(triangle_areas(surface.vertices, surface.triangles))
-    rng = np.random.default_rng(seed)
-    place = (np.arange(count) + rng.random(count)) * (areas[-1] / count)
-    corners = surface.triangles[np.minimum(np.searchsorted(areas, place, side="right"), len(areas) - 1)]
-    root, second = np.sqrt(rng.random(count)), rng.random(count)
-    weights = np.stack([1 - root, root * (1 - second), root * second], axis=1)
-    return np.asarray(np.einsum("nk,nkc->nc", weights, surface.vertices[corners]))
-
-
-def added_share(
-    reference: Surface, distorted: Surface, reach: float, seed: int, count: int = ADDED_POINTS
-) -> Work[float]:
-    """Share of the distorted surface's area that is farther than reach from the reference; yields 0.7 to 1.
-
-    A one-way metric looks around the reference only, and cannot see it.
-    """
-    points = spread_points(distorted, count, seed)
-    points = points[morton_order(points)]
-    far = 0
-    for first in range(0, count, _BATCH):
-        batch = points[first : first + _BATCH]
-        nearest, _ = closest_on(reference, batch, reference.query.nearest(batch, None))
-        away = batch - nearest
-        far += int(np.count_nonzero(dot(away, away) > reach * reach))
-        yield 0.7 + 0.3 * (first + len(batch)) / count
-    return far / count
-
-
 def differing_maps(reference: Surface, distorted: Surface) -> list[str]:
     """Inputs of shaders, other than what the metric sees, whose images are not the same on both; by name."""
     kept, now = (_maps(surface) for surface in (reference, distorted))
     return sorted(role for role in kept.keys() | now.keys() if kept.get(role) != now.get(role))
 
 
+def one_sided_maps(surface: Surface, other: Surface) -> list[str]:
+    """Inputs of shaders that images feed on a surface and none on the other; "Normal of Leaves" where another material
+    of the other has one. None where the other's images are not known: a texture was given for all of it."""
+    if any(material.how == "given" for material in (*surface.materials, *other.materials)):
+        return []
+    kept, now = _maps(surface), _maps(other)
+    lost = sorted(kept.keys() - now.keys())
+    theirs = {material.name: _roles(material.images) for material in other.materials}
+    for material in surface.materials:
+        missing = _roles(material.images) - theirs.get(material.name, _roles(material.images)) - set(lost)
+        lost += [f"{role} of {material.name or NO_MATERIAL}" for role in sorted(missing)]
+    return list(dict.fromkeys(lost))
+
+
+def _images_fact(same: bool | None) -> Fact:
+    return Fact("same_images", same, "yes or no", "" if same is not None else "not both have images that are known")
+
+
+def same_images(reference: Surface, distorted: Surface) -> bool | None:
+    """Whether base colors come from images of the same contents; None where a mesh has none that are known."""
+    contents = [
+        {image.digest for image in all_images(surface) if "base color" in (image.role, *image.roles)}
+        for surface in (reference, distorted)
+    ]
+    return contents[0] == contents[1] if all(contents) else None
+
+
 def _maps(surface: Surface) -> dict[str, set[str]]:
     """The contents of the images, by the input that they feed, that the metric does not look at."""
     maps: dict[str, set[str]] = {}
     for image in all_images(surface):
-        if image.role not in {"base color", "alpha"}:
-            maps.setdefault(image.role, set()).add(image.digest)
+        for role in _roles((image,)):
+            maps.setdefault(role, set()).add(image.digest)
     return maps
+
+
+def _roles(images: Sequence[ImageFacts]) -> set[str]:
+    """The inputs that the images feed and that the metric does not look at."""
+    return {role for image in images for role in image.roles or (image.role,)} - _SEEN_ROLES
 
 
 def _patch_facts(result: Result) -> tuple[Fact, ...]:
@@ -176,18 +231,65 @@ def _patch_facts(result: Result) -> tuple[Fact, ...]:
     )
 
 
-def _see_through(surface: Surface, fields: Fields) -> Work[float]:
-    """Share of samples whose nearest place is transparent; yields 0.6."""
+def _width_facts(result: Result) -> tuple[Fact, Fact]:
+    """Of the patches that grew without a jump: where triangles are as long as the box, they decide the score."""
+    width = np.array([0.0 if patch.extended else patch.diagonal for patch in result.patches])
+    return (
+        Fact("widest_patch", min(float(width.max()), 1.0), "share of the reference's box diagonal"),
+        Fact("wide_patches", _share(width > WIDE), "share of patches that span half of it"),
+    )
+
+
+def _distance_facts(name: str, found: Apart, scale: float, box: float) -> tuple[Fact, Fact]:
+    """In scene units and as shares of the reference's box, of the points that are spread over one mesh."""
+    values = {"mean": found.mean, "rms": found.rms, "largest": found.largest}
+    return (
+        Fact(name, {key: value * scale for key, value in values.items()}, "scene units"),
+        Fact(
+            f"{name}_of_box",
+            {key: value / box for key, value in values.items()},
+            "share of the reference's box diagonal",
+        ),
+    )
+
+
+def _collapsed(surface: Surface) -> float:
+    """Share of the triangles given that have become lines or points, or lie on one another."""
+    preparation = surface.preparation
+    return (preparation.flat + preparation.repeated) / preparation.given
+
+
+def _alphas(surface: Surface, fields: Fields) -> Work[Floats]:
+    """(N,) opacity at each sample's nearest place; yields 0.5."""
     has_alpha = np.array([material.alpha is not None for material in surface.materials])
     rows = np.flatnonzero(has_alpha[surface.material[fields.triangle]])
-    count = 0
+    alphas = np.ones(len(fields.triangle))
     for first in range(0, len(rows), _SEEN):
         batch = rows[first : first + _SEEN]
         triangle = fields.triangle[batch]
         _, weights = closest_on(surface, fields.nearest[batch], triangle)
-        count += int(np.count_nonzero(surface.alpha_at(triangle, weights) < OPAQUE))
-        yield 0.6
-    return count / len(fields.triangle)
+        alphas[batch] = surface.alpha_at(triangle, weights)
+        yield 0.5
+    return alphas
+
+
+def _alpha_zero(surface: Surface, fields: Fields, alpha: Floats) -> list[str]:
+    """Names of the materials that have samples and no opacity at any of them."""
+    material = surface.material[fields.triangle]
+    seen = np.zeros(len(surface.materials))
+    np.maximum.at(seen, material, alpha)
+    count = np.bincount(material, minlength=len(seen))
+    return [
+        _with_image(material)
+        for material, most, samples in zip(surface.materials, seen.tolist(), count.tolist(), strict=True)
+        if samples and most == 0
+    ]
+
+
+def _with_image(material: Material) -> str:
+    """A material's name, and that of the image which its alpha comes from."""
+    image = next((image.name for image in material.images if "alpha" in (image.role, *image.roles)), "")
+    return f"{material.name or NO_MATERIAL} ({image})" if image else material.name or NO_MATERIAL
 
 
 def _magenta_share(surface: Surface, fields: Fields) -> float:
@@ -213,50 +315,3 @@ def _diagonal(surface: Surface) -> float:
 
 def _share(mask: NDArray[np.bool_]) -> float:
     return float(np.count_nonzero(mask) / len(mask))
-
-
-def _warnings(
-    reference: str, distorted: str, result: Result, sides: Sequence[Sequence[Fact]], pair: Sequence[Fact]
-) -> tuple[str, ...]:
-    """The facts that pass their limits, as sentences."""
-    values = {fact.name: fact.value for fact in pair}
-    warnings = []
-    all_scored = len(result.patches) >= min(result.settings.patches, len(result.patch_mesh.vertices))
-    if all_scored and values["covered"] < LEAST_COVERED:
-        warnings.append(
-            f"{reference}: the patches cover {_percent(values['covered'])} of its area; the rest has no say in the "
-            "score (more patches cover more)"
-        )
-    if values["sign_in_doubt_and_different"] > SIGN_IN_DOUBT:
-        warnings.append(
-            f"{distorted}: at {_percent(values['sign_in_doubt_and_different'])} of the samples inside and outside are "
-            "in doubt and differ from the reference's; close the holes, or turn the normals of either mesh outwards"
-        )
-    if values["flipped"] > FLIPPED:
-        warnings.append(
-            f"{distorted}: {_percent(values['flipped'])} of its faces, by samples, look the other way than the "
-            "reference's; the score cannot see that (recalculate its normals)"
-        )
-    if values["added"] > ADDED:
-        warnings.append(
-            f"{distorted}: {_percent(values['added'])} of its area lies far from the reference; the score looks around "
-            "the reference only and cannot see that (Both Directions, --both, does)"
-        )
-    for name, facts in zip((reference, distorted), sides, strict=True):
-        of = {fact.name: fact.value for fact in facts}
-        if of["magenta"] > MAGENTA:
-            warnings.append(
-                f"{name}: {_percent(of['magenta'])} of the samples on it are magenta, as Blender shows images and UDIM "
-                "tiles that are missing; repair its images"
-            )
-        missing = of["uv_missing"]
-        if missing is not None and missing > UV_MISSING:
-            warnings.append(
-                f"{name}: {_percent(missing)} of its textured area has no texture coordinates (all are 0, 0) and the "
-                "color of one pixel; unwrap it"
-            )
-    return tuple(dict.fromkeys(warnings))  # a mesh may be compared with itself
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.3g} %"

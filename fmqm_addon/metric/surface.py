@@ -34,6 +34,9 @@ class MeshArrays:
         materials: what the triangles look like.
         warnings: what the adapter had to leave out or assume, so that a score may mislead. notes: what it did that
             misleads nobody.
+        objects: names of what it was joined from; none: it is one object, of the name of the mesh.
+        object: (T,) integers into objects.
+        rounding: the positions were rounded to about this much where they were stored, in scene units.
     """
 
     name: str
@@ -44,12 +47,16 @@ class MeshArrays:
     materials: tuple[Material, ...]
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    objects: tuple[str, ...] = ()
+    object: NDArray[Any] | None = None
+    rounding: float = 0.0
 
 
 def join_meshes(parts: Sequence[MeshArrays], name: str) -> MeshArrays:
-    """Several meshes as one, in their order; a material that they share stays one."""
+    """Several meshes as one, in their order; a material that they share stays one, and each is an object."""
+    objects = tuple(part.name for part in parts)
     if len(parts) == 1:
-        return replace(parts[0], name=name)
+        return replace(parts[0], name=name, objects=objects)
     materials: dict[int, Material] = {}
     for part in parts:
         materials.update((id(material), material) for material in part.materials)
@@ -72,6 +79,9 @@ def join_meshes(parts: Sequence[MeshArrays], name: str) -> MeshArrays:
         materials=tuple(materials.values()),
         warnings=tuple(dict.fromkeys(warning for part in parts for warning in part.warnings)),
         notes=tuple(dict.fromkeys(note for part in parts for note in part.notes)),
+        objects=objects,
+        object=np.repeat(np.arange(len(parts), dtype=np.int32), [len(part.triangles) for part in parts]),
+        rounding=max(part.rounding for part in parts),
     )
 
 
@@ -132,6 +142,7 @@ class Surface:
         triangles: (T, 3) int64; none is degenerate, none repeats another.
         corners: (T, 3, K) float64, finite; material: (T,) int64; materials: as in MeshArrays.
         source: (T,) int64, the row of each triangle in MeshArrays.
+        objects: names, at least one. object: (T,) into objects. rounding: as in MeshArrays, in the metric's frame.
         preparation: what was left out and welded. warnings, notes: as in MeshArrays, and what preparing adds to them.
     """
 
@@ -143,6 +154,9 @@ class Surface:
     material: Ints
     materials: tuple[Material, ...]
     source: Ints
+    objects: tuple[str, ...]
+    object: Ints
+    rounding: float
     query: SurfaceQuery
     preparation: Preparation
     warnings: tuple[str, ...]
@@ -258,6 +272,9 @@ def preparing_surface(
         material=np.asarray(mesh.material, np.int64)[source],
         materials=mesh.materials,
         source=source,
+        objects=mesh.objects or (mesh.name,),
+        object=np.zeros(len(source), np.int64) if mesh.object is None else np.asarray(mesh.object, np.int64)[source],
+        rounding=mesh.rounding / frame.scale,
         query=build_query(vertices, triangles),
         preparation=Preparation(len(mesh.triangles), not_finite, flat, repeated, welded),
         warnings=tuple(warnings),

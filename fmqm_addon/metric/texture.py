@@ -43,7 +43,8 @@ class ImageFacts:
     """An image that a material uses, whether the metric sees it or not.
 
     Attributes:
-        role: "base color", "alpha", or the shader's input that it feeds ("Normal", "Roughness").
+        role: "base color", "alpha", or the shader's input that it feeds ("Normal", "Roughness"). roles: all that it
+            feeds; empty: only that one.
         name, path: as Blender has them; the path is "" for images that were made in Blender.
         width, height: pixels; 0 where unknown.
         color_space: Blender's name of it.
@@ -59,6 +60,7 @@ class ImageFacts:
     color_space: str
     missing: bool
     digest: str
+    roles: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -1,81 +1,78 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A pair's record in plain words: what got worse, where, and how sure that is. From the numbers alone."""
+"""A pair's record in plain words: what got worse, where, and how sure that is. From its numbers and facts."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from ..metric.evaluation import COLUMNS, Result
-from ..metric.geometry import Floats
+from ..comparison.color_shift import JUST_NOTICEABLE
+from ..comparison.doubts import LEAST_COVERED
+from ..comparison.levels import LEVELS, capped_by, level_of
+from ..comparison.places import place_name
+from ..metric.evaluation import Result
+from ..metric.perceived import PERCEIVED_COLUMNS
 from ..metric.surface import Surface
+from .causes import Facts, causes
 
 SEED_NOISE = 0.01  # FMQM of other seeds differs by less than this
+PERCEIVED_NOISE = 0.002  # and perceived by less than this
 FEW_PATCHES = 100  # a score of fewer is a quick look
-
-# From which FMQM on. The words are ours: the paper has no such bands.
-_VERDICTS = (
-    (0.9995, "cannot be told from"),
-    (0.95, "looks almost like"),
-    (0.85, "looks much like"),
-    (0.7, "looks visibly different from"),
-    (0.0, "looks very different from"),
+_FOOTNOTE = (
+    f"Levels: {', '.join(f'{words} (perceived from {least:g} on)' for least, words in LEVELS[:-1])}, {LEVELS[-1][1]}; "
+    "they were fitted on human scores of one model, an orientation, and facts that perceived does not see lower them. "
+    f"Other random samples move FMQM by up to {SEED_NOISE:g} and perceived by up to {PERCEIVED_NOISE:g}: smaller "
+    "differences say nothing."
 )
+
 _GEOMETRY = {
-    "geoSSIM": "the surface has moved, shrunk or lost its bumps",
-    "geoGraSSIM": "the surface is bent or faceted",
+    "shape": "the surface has moved, shrunk or lost its bumps",
+    "facing": "the surface is bent or faceted, so that light falls on it differently",
 }
 _COLOR = {
-    "colorSSIM": "the colors have shifted or are blurred",
-    "colorGraSSIM": "edges in the texture are weaker or softer, or have moved",
+    "color": "the colors are paler, blurred or not where they were",
+    "detail": "edges in the texture are softer, or have moved",
 }
+_SHIFTED = "the colors have shifted"
 _SMALL = 0.01  # a feature's loss that is not worth a word
-_AXES = (("left", "right"), ("front", "back"), ("lower", "upper"))  # x, y, z; Blender's front view looks along y
-_ORDER = (2, 0, 1)  # "upper left front"
-_ALONE = {"left": "left side", "right": "right side", "lower": "bottom", "upper": "top"}
 _TENTH = 0.1  # of the patches
 _SPREAD = 0.2  # the worst tenth of the patches has less than this of the loss: it is everywhere
 _SHARES = ((0.9, "nearly all"), (0.6, "most"), (0.45, "about half"), (0.28, "about a third"), (0.0, "about a quarter"))
 _WORST = 3  # patches whose places are named
+_PERCEIVED = PERCEIVED_COLUMNS.index("perceived")
+
+
+def footnote(records: Iterable[Mapping[str, Any]]) -> str:
+    """What is the same for every pair, to stand once."""
+    few = {record["patches"] for record in records if record["patches"] is not None and record["patches"] < FEW_PATCHES}
+    quick = f" A score of {min(few)} patches is a quick look." if few else ""
+    return f"{_FOOTNOTE}{quick}"
 
 
 def where(reference: Surface, result: Result) -> dict[str, Any]:
-    """The record's "where": how the loss lies on the reference.
+    """The record's "where": how the loss of perceived lies on the reference.
 
     Returns:
-        below_mean: share of patches whose FMQM is below the mean. worst_tenth: share of all loss that the worst tenth
-        of the patches has; None where nothing is lost. worst: the worst patches' "place" in the reference's box, in
-        words, and "FMQM".
+        below_mean: share of patches whose perceived is below the mean. worst_tenth: share of all loss that the worst
+        tenth of the patches has; None where nothing is lost. worst: the worst patches' "place" in the reference's box,
+        in words, and "perceived".
     """
-    fmqm = result.patch_scores[:, COLUMNS.index("FMQM")]
-    loss = np.maximum(1 - fmqm, 0)
-    order = np.argsort(fmqm, kind="stable")
-    tenth = order[: max(1, round(_TENTH * len(fmqm)))]
+    perceived = result.patch_perceived[:, _PERCEIVED]
+    loss = np.maximum(1 - perceived, 0)
+    order = np.argsort(perceived, kind="stable")
+    tenth = order[: max(1, round(_TENTH * len(perceived)))]
     low, high = reference.vertices.min(axis=0), reference.vertices.max(axis=0)
     total = float(loss.sum())
     return {
-        "below_mean": float(np.mean(fmqm < fmqm.mean())),
+        "below_mean": float(np.mean(perceived < perceived.mean())),
         "worst_tenth": float(loss[tenth].sum()) / total if total > 0 else None,
         "worst": [
-            {"place": place_name(result.patch_centers[row], low, high), "FMQM": float(fmqm[row])}
+            {"place": place_name(result.patch_centers[row], low, high), "perceived": float(perceived[row])}
             for row in order[:_WORST]
         ],
     }
-
-
-def place_name(position: Floats, low: Floats, high: Floats) -> str:
-    """A position in a box by thirds, such as "upper left front"; "middle" in the middle of all."""
-    words = []
-    for axis in _ORDER:
-        size = high[axis] - low[axis]
-        share = (position[axis] - low[axis]) / size if size > 0 else 0.5
-        if not 1 / 3 <= share <= 2 / 3:
-            words.append(_AXES[axis][int(share > 0.5)])
-    if len(words) == 1:
-        return _ALONE.get(words[0], words[0])
-    return " ".join(words) or "middle"
 
 
 def explain(record: Mapping[str, Any]) -> str:
@@ -86,19 +83,30 @@ def explain(record: Mapping[str, Any]) -> str:
     """
     if record["error"] is not None:
         return f"Not scored: {record['error']}."
-    parts = [_verdict(record), _worse(record), _place(record), _sureness(record)]
-    return " ".join(part for part in parts if part)
+    facts = Facts(record)
+    parts = [_verdict(record, facts), _worse(record, facts), *causes(record["perceived"], facts), _place(record)]
+    return " ".join(part for part in (*parts, _sureness(record, facts)) if part)
 
 
-def _verdict(record: Mapping[str, Any]) -> str:
-    fmqm = record["FMQM"]
-    verdict = next(words for least, words in _VERDICTS if fmqm >= least)
-    return f"{record['distorted']} {verdict} {record['reference']} (FMQM {_short(fmqm)})."
+def _verdict(record: Mapping[str, Any], facts: Facts) -> str:
+    score, names = record["perceived"]["score"], (record["distorted"], record["reference"])
+    caps = capped_by(score, facts.pair)
+    but = f", but {_joined(caps)}" if caps else ""
+    level = level_of(score, facts.pair)
+    if level != LEVELS[0][1]:
+        return f"{names[0]} differs from {names[1]}: {level} (perceived {_short(score)}{but})."
+    if record["warnings"]:
+        return f"What differs between {names[0]} and {names[1]} is {level} (perceived {_short(score)})."
+    return f"{names[0]} cannot be told from {names[1]} (perceived {_short(score)})."
 
 
-def _worse(record: Mapping[str, Any]) -> str:
-    """By what the loss is attributed to, where that is known; moved geometry alone lowers the color features too."""
-    geometry, color = _worst(record, _GEOMETRY), _worst(record, _COLOR)
+def _worse(record: Mapping[str, Any], facts: Facts) -> str:
+    """By the lowest feature, and by what the loss is attributed to, where that is known; moved geometry alone lowers
+    the color features too."""
+    features = record["perceived"]
+    geometry, color = _worst(features, _GEOMETRY), _worst(features, _COLOR)
+    if color == _COLOR["color"] and (facts.pair.get("color_shift") or 0) >= JUST_NOTICEABLE:
+        color = _SHIFTED
     attribution = record.get("attribution")
     if not geometry and not color:
         return ""
@@ -109,11 +117,12 @@ def _worse(record: Mapping[str, Any]) -> str:
     if not color:
         return f"The color is nearly as it was; {geometry}."
     if attribution is None:
-        return f"It is the geometry: {geometry}. The colors suffer from that, from a change of their own, or from both."
+        is_geometry = min(features[name] for name in _GEOMETRY) <= min(features[name] for name in _COLOR)
+        most, less = (geometry, color) if is_geometry else (color, geometry)
+        return f"Above all {most}; besides, {less}."
+    rough = ""
     if attribution["how"] == "nearest points":
         rough = " That is a rough guess, since the two are not unwrapped alike."
-    else:
-        rough = ""
     return {
         "geometry": f"Most of the loss is the geometry: {geometry}, and the colors with it.{rough}",
         "texture": f"Most of the loss is the texture: {color}.{rough}",
@@ -122,15 +131,15 @@ def _worse(record: Mapping[str, Any]) -> str:
     }[attribution["mostly"]]
 
 
-def _worst(record: Mapping[str, Any], features: Mapping[str, str]) -> str:
+def _worst(values: Mapping[str, float], features: Mapping[str, str]) -> str:
     """What the lowest of the features means; "" where all are as good as 1."""
-    name = min(features, key=lambda name: record[name])
-    return features[name] if record[name] < 1 - _SMALL else ""
+    name = min(features, key=lambda name: values[name])
+    return features[name] if values[name] < 1 - _SMALL else ""
 
 
 def _place(record: Mapping[str, Any]) -> str:
     found = record.get("where")
-    if found is None or found["worst_tenth"] is None or record["FMQM"] >= 1 - _SMALL:
+    if found is None or found["worst_tenth"] is None or record["perceived"]["score"] >= 1 - _SMALL:
         return ""
     places = _joined(list(dict.fromkeys(patch["place"] for patch in found["worst"])))
     if found["worst_tenth"] < _SPREAD:
@@ -139,32 +148,18 @@ def _place(record: Mapping[str, Any]) -> str:
     return f"A tenth of the surface has {share} of the loss, at the {places}."
 
 
-def _sureness(record: Mapping[str, Any]) -> str:
+def _sureness(record: Mapping[str, Any], facts: Facts) -> str:
     sentences = []
-    stderr = record["stderr"]
-    if stderr is not None and stderr["FMQM"] < SEED_NOISE / 2:
-        sentences.append("Other random samples give the same score within a hundredth.")
-    elif stderr is not None:
-        sentences.append(f"Other random samples move the score by about {_short(2 * stderr['FMQM'])}.")
-    elif record["FMQM"] < 1 - _SMALL:
-        sentences.append("Differences below a hundredth say nothing: other random samples would make as much.")
-    if record["patches"] < FEW_PATCHES:
-        sentences.append(f"This was a quick look at {record['patches']} patches.")
-    covered = _fact(record, "covered")
-    if covered is not None and covered < 0.6:
+    stderr = record["perceived"]["stderr"]
+    if stderr is not None and 2 * stderr["score"] > PERCEIVED_NOISE:
+        sentences.append(f"Other random samples move perceived by about {2 * stderr['score']:.2g}.")
+    if record["patches"] >= FEW_PATCHES and (facts.pair.get("covered") or 1) < LEAST_COVERED:
         sentences.append("Much of the reference was not looked at.")
     if record["warnings"]:
         others = len(record["warnings"]) - 1
         more = f" (and {others} more {'warning' if others == 1 else 'warnings'})" if others else ""
         sentences.append(f"Before believing it: {record['warnings'][0]}{more}.")
     return " ".join(sentences)
-
-
-def _fact(record: Mapping[str, Any], name: str) -> float | None:
-    """Of the pair in the trust report, where that is there and knows it."""
-    trust = record.get("trust")
-    item = None if trust is None else trust["pair"].get(name)
-    return None if item is None else item["value"]
 
 
 def _short(number: float) -> str:

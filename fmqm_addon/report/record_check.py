@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NoReturn
 
 from ..comparison.judge import Judge
+from ..comparison.levels import LEVELS
 from ..metric.perceived import Perceived
 from .explain import explain
 from .records import RECORD_KEYS, SHOWN, STAGES
@@ -172,6 +173,18 @@ def is_attribution(value: object) -> bool:
     )
 
 
+def _is_part(value: object) -> bool:
+    """Whether it is what comparison.parts.Part.as_dict gives."""
+    return (
+        isinstance(value, Mapping)
+        and all(_is_text(value.get(name)) for name in ("kind", "name"))
+        and _is_count(value.get("triangles"))
+        and _is_share(value.get("area"))
+        and all(value.get(name) is None or _is_share(value[name]) for name in ("FMQM", "perceived"))
+        and isinstance(value.get("missing"), bool)
+    )
+
+
 def is_trust(value: object) -> bool:
     """Whether it can be shown as what report.trust_table.trust_dict gives. It is nested, and only read to be shown."""
     report: Any = value
@@ -206,4 +219,6 @@ _KINDS: dict[str, Any] = {
     "pictures": _is_pictures,
     "attribution": lambda value: value is None or is_attribution(value),
     "trust": lambda value: value is None or is_trust(value),
+    "level": lambda value: value is None or value in {words for _, words in LEVELS},
+    "parts": lambda value: _is_list(value, _is_part),
 }

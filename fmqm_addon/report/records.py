@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from itertools import chain
 from typing import Any, NamedTuple
 
+from ..comparison.levels import level_of
 from ..comparison.measurement import Readings
 from ..metric.errors import one_line
 from ..metric.evaluation import COLUMNS, Scores
@@ -50,7 +51,7 @@ class PairScore:
         error: why there are no scores. level: of detail, where that is known. costs: None where there are no scores.
         space: where the two were compared, as comparison.alignment.Alignment.label has it.
         reverse: readings of the other direction, the distorted mesh as the reference; None: not asked for.
-        trust: as report.trust_table.trust_dict has it.
+        trust: as report.trust_table.trust_dict has it. parts: as comparison.parts.Part.as_dict has each.
         findings: what else was asked for, by its key in the record: where, attribution, pictures.
     """
 
@@ -68,6 +69,7 @@ class PairScore:
     space: str | None = None
     reverse: Readings | None = None
     trust: Report | None = None
+    parts: tuple[dict[str, Any], ...] = ()
     findings: dict[str, Any] = field(default_factory=dict)
 
 
@@ -173,9 +175,16 @@ def pair_record(pair: PairScore) -> dict[str, Any]:
         "level": pair.level,
         **(dict.fromkeys(Costs._fields) if pair.costs is None else pair.costs._asdict()),
         "reverse": None if pair.reverse is None else _read(pair.reverse),
+        "level": None if pair.readings is None else _level(pair.readings, pair.trust),
         "trust": pair.trust,
+        "parts": list(pair.parts),
         **pair.findings,
     }
+
+
+def _level(readings: Readings, trust: Report | None) -> str:
+    facts = {} if trust is None else {name: item["value"] for name, item in trust["pair"].items()}
+    return level_of(readings.perceived.score, facts)
 
 
 def value_of(record: Mapping[str, Any], column: str) -> float | None:

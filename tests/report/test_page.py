@@ -46,7 +46,15 @@ def record(distorted: str = "lod.glb", score: float | None = 0.5, **others: Any)
     pair = {"id": distorted, "reference": "ref.glb", "distorted": distorted, **numbers(score), "stderr": None}
     return (
         pair
-        | {**ANYTHING.record_fields(), "warnings": [], "notes": [], "error": None if score is not None else "it cannot be read"}
+        | {
+            **ANYTHING.record_fields(),
+            "warnings": [],
+            "level": None,
+            "parts": [],
+            "patches": 250,
+            "notes": [],
+            "error": None if score is not None else "it cannot be read",
+        }
         | others
     )
 

@@ -6,6 +6,8 @@ Read is what the importers of glTF, FBX, USD and OBJ build and what artists make
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import bpy
 
 from ...metric.errors import MeshError
@@ -85,15 +87,16 @@ def plain_look(material: bpy.types.Material, warning: str) -> Look:
 
 
 def used_images(material: bpy.types.Material, cache: TextureCache) -> tuple[ImageFacts, ...]:
-    """Every image that the material's output depends on, once, by the first role that it plays."""
-    roles: dict[bpy.types.Image, str] = {}
+    """Every image that the material's output depends on, once, with all roles that it plays."""
+    roles: dict[bpy.types.Image, set[str]] = {}
     for start in outputs(material):
         for node, role in upstream(start):
             image = getattr(node, "image", None)
-            if isinstance(image, bpy.types.Image) and (image not in roles or role in FIRST_ROLES):
-                roles[image] = min(roles.get(image, role), role, key=_rank)
-    ordered = sorted(roles.items(), key=lambda item: (_rank(item[1]), item[1]))
-    return tuple(cache.facts(image, role) for image, role in ordered)
+            if isinstance(image, bpy.types.Image):
+                roles.setdefault(image, set()).add(role)
+    played = [(image, sorted(each, key=lambda role: (_rank(role), role))) for image, each in roles.items()]
+    played.sort(key=lambda item: (_rank(item[1][0]), item[1][0]))
+    return tuple(replace(cache.facts(image, each[0]), roles=tuple(each)) for image, each in played)
 
 
 def _rank(role: str) -> int:

@@ -102,7 +102,8 @@ def mesh_arrays(
     space = getattr(getattr(bpy.data, "colorspace", None), "working_space", _WORKING_SPACE)  # none before 5.0
     if space != _WORKING_SPACE:
         warnings.append((name, f"the file's working space is {space}; its colors are taken as {_WORKING_SPACE}"))
-    joined = join_meshes([moved(parts[instance.shape], instance.matrix) for instance in instances], one_line(name))
+    placed = [replace(moved(parts[each.shape], each.matrix), name=each.name) for each in instances]
+    joined = join_meshes(placed, one_line(name))
     notes = [(instance.name, note) for instance in instances for note in parts[instance.shape].notes]
     return replace(joined, warnings=_joined(warnings), notes=_joined(notes))
 
@@ -302,7 +303,14 @@ def _as_arrays(shape: _Shape, reading: Reading) -> MeshArrays:
         materials=tuple(look.material for look in looks),
         warnings=(*(warning for look in looks for warning in look.warnings), *of_slots),
         notes=tuple(note for look in looks for note in look.notes),
+        rounding=_rounding(shape.positions),
     )
+
+
+def _rounding(positions: NDArray[np.float32]) -> float:
+    """The step between the numbers that a file or Blender can hold where these are."""
+    farthest = np.abs(positions[np.isfinite(positions).all(axis=1)]).max(initial=0)
+    return float(np.spacing(farthest))
 
 
 def _resolved(shape: _Shape, reading: Reading) -> dict[int, tuple[Look, NDArray[np.float32]]]:

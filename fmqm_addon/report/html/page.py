@@ -18,6 +18,7 @@ from typing import Any
 from ...comparison.judge import Judge
 from ..atomic_files import write_parts
 from ..criteria import judge_of, shortfall
+from ..explain import footnote
 from ..records import TABLE, value_of
 from .chain_curve import Level, curve_svg
 from .fragments import MEGABYTE, MISSING, bar, score, text
@@ -93,7 +94,7 @@ def page_parts(records: Iterable[Record], settings: Mapping[str, Any], versions:
             chain = overview.chains.pop(reference, [])
             yield f"<h2>{text(reference)}</h2>\n{_curves(reference, chain, overview.judge)}"
         yield pair_card(number, record, _name(record, folder))
-    yield f"""{_settings(settings, versions)}
+    yield f"""{_settings(settings, versions)}<p class="note">{escape(footnote(records))}</p>
 </main>
 <script>{script}</script>
 </body>

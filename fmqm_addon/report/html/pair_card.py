@@ -12,6 +12,7 @@ import numpy as np
 
 from ...comparison.judge import Judge
 from ..criteria import judge_of, shortfall
+from ..parts_table import part_cells, worst_first
 from ..records import PERCEIVED, SHOWN, value_of
 from ..trust_table import Report, trust_lines
 from ..visual.colormap import NO_PATCH, score_colors
@@ -30,7 +31,8 @@ def pair_card(number: int, record: Record, name: str) -> str:
     whole_path = "" if name == path else f'<p class="faint">{text(path)}</p>'
     parts = [
         f'<div class="title"><div><h3>{text(name)}</h3>{whole_path}</div>'
-        f'<p class="score"><span class="faint">{judge.column}</span> {score(record, judge.column)}</p></div>',
+        f'<p class="score"><span class="faint">{judge.column}</span> {score(record, judge.column)}'
+        f"{_level(record)}</p></div>",
         f'<p class="bad">Too low: {missed}.</p>' if (missed := shortfall(record)) else "",
     ]
     if record["error"]:
@@ -49,12 +51,18 @@ def pair_card(number: int, record: Record, name: str) -> str:
             f"{_attribution(record.get('attribution'))}"
             f"<h4>Perceived and its features</h4>{_numbers(record, PERCEIVED)}</div>{close_ups}</div>"
         )
+    if record["parts"]:
+        parts.append(_parts(record["parts"]))
     if record["notes"]:
         items = "".join(f"<li>{text(note)}</li>" for note in record["notes"])
         parts.append(f"<details><summary>Notes</summary><ul>{items}</ul></details>")
     if record.get("trust"):
         parts.append(_trust(record["trust"]))
     return f'<article class="card" id="pair-{number}">{"".join(parts)}</article>\n'
+
+
+def _level(record: Record) -> str:
+    return f'<br><span class="faint">{escape(record["level"])}</span>' if record["level"] else ""
 
 
 def _numbers(record: Record, columns: Iterable[str]) -> str:
@@ -118,7 +126,7 @@ def _close_ups(worst: Sequence[Record], judge: Judge) -> str:
         for rank, each in enumerate(worst, 1)
     )
     return (
-        f"<div><h4>Worst patches: reference, distorted; their {judge.column} and what lowers it most</h4>"
+        f"<div><h4>Worst patches: reference, distorted; their {judge.column} and lowest feature of perceived</h4>"
         f'<div class="close-ups">{figures}</div></div>'
     )
 
@@ -126,6 +134,22 @@ def _close_ups(worst: Sequence[Record], judge: Judge) -> str:
 def _image(path: str, alt: str, size: tuple[int, int] | None = None) -> str:
     sized = "" if size is None else ' width="{}" height="{}"'.format(*(escape(str(side)) for side in size))
     return f'<img src="{escape(quote(path))}" alt="{escape(alt)}"{sized} loading="lazy">'
+
+
+def _parts(parts: Sequence[Record]) -> str:
+    """Each part's scores; those that are gone first."""
+    rows = []
+    for part in worst_first(parts):
+        kind, name, *numbers, gone = part_cells(part)
+        cells = "".join(f'<td class="number">{escape(number)}</td>' for number in numbers)
+        note = f' <span class="bad">{gone}</span>' if gone else ""
+        rows.append(f'<tr><th scope="row">{text(name)}{note}</th><td>{escape(kind)}</td>{cells}</tr>')
+    return (
+        f'<details><summary>Parts ({len(parts)})</summary><div class="scroll" tabindex="0" role="region" '
+        'aria-label="Parts"><table><thead><tr><th scope="col">Part</th><th scope="col">Kind</th>'
+        '<th scope="col">Triangles</th><th scope="col">Area</th><th scope="col">FMQM</th>'
+        f'<th scope="col">Perceived</th></tr></thead><tbody>{"".join(rows)}</tbody></table></div></details>'
+    )
 
 
 def _trust(trust: Report) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from ...comparison.judge import Judge
 from ...metric.evaluation import Result
 from ...metric.geometry import Floats
+from ...metric.perceived import PERCEIVED_COLUMNS
 from ...metric.surface import triangle_areas, triangle_normals
 
 
@@ -18,8 +19,8 @@ class WorstPatch:
     """One of the lowest patches.
 
     Attributes:
-        patch: its row. score: the judge's, of it. blame: which of the judge's features falls furthest below its own
-            mean over the patches. value: that feature's.
+        patch: its row. score: the judge's, of it. blame: which of the four features of perceived is lowest. value: that
+            feature's.
     """
 
     patch: int
@@ -31,14 +32,11 @@ class WorstPatch:
 def worst_patches(result: Result, count: int, judge: Judge = Judge.FMQM) -> list[WorstPatch]:
     """The patches that the judge scores lowest, worst first."""
     score = result.of_patches(judge.column)
-    table = np.stack([result.of_patches(feature) for feature in judge.features], axis=1)
-    usual = np.maximum(table.mean(axis=0), 1e-12)
+    table = result.patch_perceived[:, :4]
     worst = []
     for patch in np.argsort(score, kind="stable")[:count].tolist():
-        features = table[patch]
-        # Features have levels of their own; where all are at theirs, the lowest is named.
-        feature = int(np.lexsort((features, np.round(features / usual, 6)))[0])
-        worst.append(WorstPatch(patch, float(score[patch]), judge.features[feature], float(features[feature])))
+        lowest = int(table[patch].argmin())
+        worst.append(WorstPatch(patch, float(score[patch]), PERCEIVED_COLUMNS[lowest], float(table[patch, lowest])))
     return worst
 
 
