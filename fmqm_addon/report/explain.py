@@ -83,9 +83,14 @@ def explain(record: Mapping[str, Any]) -> str:
     """
     if record["error"] is not None:
         return f"Not scored: {record['error']}."
+    return " ".join(part for part in (verdict(record), _place(record), _sureness(record, Facts(record))) if part)
+
+
+def verdict(record: Mapping[str, Any]) -> str:
+    """How much a scored pair differs, by what, and why, as far as that is known."""
     facts = Facts(record)
-    parts = [_verdict(record, facts), _worse(record, facts), *causes(record["perceived"], facts), _place(record)]
-    return " ".join(part for part in (*parts, _sureness(record, facts)) if part)
+    parts = (_verdict(record, facts), _worse(record, facts), *causes(record["perceived"], facts))
+    return " ".join(part for part in parts if part)
 
 
 def _verdict(record: Mapping[str, Any], facts: Facts) -> str:

@@ -173,7 +173,7 @@ def is_attribution(value: object) -> bool:
     )
 
 
-def _is_part(value: object) -> bool:
+def is_part(value: object) -> bool:
     """Whether it is what comparison.parts.Part.as_dict gives."""
     return (
         isinstance(value, Mapping)
@@ -220,5 +220,5 @@ _KINDS: dict[str, Any] = {
     "attribution": lambda value: value is None or is_attribution(value),
     "trust": lambda value: value is None or is_trust(value),
     "level": lambda value: value is None or value in {words for _, words in LEVELS},
-    "parts": lambda value: _is_list(value, _is_part),
+    "parts": lambda value: _is_list(value, is_part),
 }

@@ -15,7 +15,7 @@ from ..comparison.measurement import Readings
 from ..metric.evaluation import Scores
 from ..metric.perceived import Perceived
 from ..metric.settings import SETTING_NAMES
-from ..report.record_check import checked_json, is_attribution, is_settings, is_trust
+from ..report.record_check import checked_json, is_attribution, is_part, is_settings, is_trust
 from ..report.trust_table import Report
 
 T = TypeVar("T")
@@ -67,6 +67,13 @@ def read_trust(text: str) -> Report | None:
     """As report.trust_table.trust_dict has it."""
     found = _read(text)
     return found if is_trust(found) else None
+
+
+@functools.lru_cache(64)
+def read_parts(text: str) -> list[dict[str, Any]] | None:
+    """As comparison.parts.Part.as_dict has each."""
+    found = _read(text)
+    return found if isinstance(found, list) and all(map(is_part, found)) else None
 
 
 @functools.lru_cache(64)

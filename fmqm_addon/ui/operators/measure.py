@@ -131,7 +131,7 @@ def _write_row(fmqm: FMQMScene, outcome: Outcome, settings_text: str) -> None:
     row.bare_reference = outcome.reference_target.bare
     row.error = outcome.error or ""
     row.settings = settings_text
-    row.warnings = "\n".join(outcome.warnings)
+    row.warnings, row.notes = "\n".join(outcome.warnings), "\n".join(outcome.notes)
     row.fingerprint = " ".join(outcome.fingerprint)
     row.seconds = outcome.seconds.get("total", 0.0)
     row.stages = json.dumps(outcome.seconds)
@@ -139,6 +139,8 @@ def _write_row(fmqm: FMQMScene, outcome: Outcome, settings_text: str) -> None:
     row.share = 100 * outcome.triangles / outcome.reference_triangles if outcome.reference_triangles else 0.0
     row.attribution = "" if outcome.attribution is None else json.dumps(outcome.attribution.as_dict(), allow_nan=False)
     row.trust = "" if outcome.trust is None else json.dumps(trust_dict(outcome.trust), allow_nan=False)
+    parts = [] if outcome.trust is None else [part.as_dict() for part in outcome.trust.parts]
+    row.parts = json.dumps(parts, allow_nan=False) if parts else ""
     result, comparison = outcome.pair_result, outcome.comparison
     row.space = "" if result is None else result.alignment.label
     row.reverse = "" if result is None or result.reverse is None else stored_text.readings_text(result.reverse)

@@ -7,12 +7,16 @@ import bpy
 
 from ...comparison.alignment import SPACE_LABELS
 from ...comparison.judge import Judge
+from ...report.explain import verdict
+from ...report.records import pair_record
 from .. import session
 from ..properties.rows import (
     EXPLAINED,
     FMQMRow,
     active_row,
     comparable,
+    is_whole,
+    pair_of,
     row_attribution,
     row_reverse,
     row_scores,
@@ -155,6 +159,8 @@ def _draw_row(layout: bpy.types.UILayout, context: bpy.types.Context, fmqm: FMQM
     if attribution is not None:
         phrase = attribution["phrase"]
         wrapped(layout, context, phrase[:1].upper() + phrase[1:], icon="INFO")
+    if is_whole(row):
+        wrapped(layout, context, verdict(pair_record(pair_of(row))), icon="INFO")
     if row.warnings:
         box = layout.box().column()
         for warning in row.warnings.splitlines():

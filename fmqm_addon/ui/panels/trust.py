@@ -35,6 +35,8 @@ class FMQM_PT_trust(Sidebar, bpy.types.Panel):  # noqa: N801
         column = self.layout.column(align=True)
         for line in trust_lines(report):
             _draw_fact(column, context, line)
+        for note in () if row is None else row.notes.splitlines():
+            wrapped(column, context, note, icon="INFO")
 
 
 def _draw_fact(layout: bpy.types.UILayout, context: bpy.types.Context, line: Line) -> None:

@@ -71,12 +71,14 @@ class FMQMRow(bpy.types.PropertyGroup):
     seconds: FloatProperty(name="Seconds", description="Time that the comparison took", min=0.0, unit="TIME_ABSOLUTE")
     stages: StringProperty(name="Stages", description="Seconds by stage, as JSON")
     warnings: StringProperty(name="Warnings", description="What to know before believing the score, one a line")
+    notes: StringProperty(name="Notes", description="What was done that misleads nobody, one a line")
     error: StringProperty(name="Error", description="Why there is no score")
     space: StringProperty(name="Space", description="Where the two were compared")
     settings: StringProperty(name="Settings", description="Settings of the measurement, as JSON")
     reverse: StringProperty(name="Reverse", description="As Scores, of the other direction; empty: not measured")
     attribution: StringProperty(name="Attribution", description="Whose loss it is, as JSON; empty: not measured")
     trust: StringProperty(name="Trust", description="How far to trust the scores: facts with their units, as JSON")
+    parts: StringProperty(name="Parts", description="Scores of the reference's parts, as JSON")
     fingerprint: StringProperty(name="Fingerprint", description="Tells whether what was measured has changed since")
 
 
@@ -132,6 +134,11 @@ def row_trust(row: FMQMRow) -> Report | None:
     return stored_text.read_trust(row.trust)
 
 
+def row_parts(row: FMQMRow) -> list[dict[str, Any]]:
+    """The parts of a row, as comparison.parts.Part.as_dict has each; none for a row with an error."""
+    return stored_text.read_parts(row.parts) or []
+
+
 def settings_name(row: FMQMRow) -> str:
     """The preset that a row was measured with, or Custom."""
     used = _settings_that_count(row)
@@ -161,6 +168,7 @@ def is_whole(row: FMQMRow) -> bool:
         (row.reverse, stored_text.read_readings),
         (row.attribution, stored_text.read_attribution),
         (row.trust, stored_text.read_trust),
+        (row.parts, stored_text.read_parts),
         (row.settings, stored_text.read_settings),
         (row.stages, stored_text.read_stages),
     )
@@ -180,10 +188,12 @@ def pair_of(row: FMQMRow) -> PairScore:
         samples=row.samples or None,
         seconds=stored_text.read_stages(row.stages) or {},
         warnings=tuple(row.warnings.splitlines()),
+        notes=tuple(row.notes.splitlines()),
         error=row.error or None,
         space=row.space or None,
         reverse=row_reverse(row),
         trust=row_trust(row),
+        parts=tuple(row_parts(row)),
         findings={} if attribution is None else {"attribution": attribution},
     )
 
