@@ -31,8 +31,9 @@ from tests.blender.script import (
 )
 
 PAIR_KEYS = [
-    "id", "reference", "distorted", *COLUMNS, "stderr", "patches", "samples", "seconds", "warnings", "notes", "error",
-    "reverse", "trust", "ref_texture", "texture", "settings", "fail_under",
+    "id", "reference", "distorted", *COLUMNS, "perceived", "stderr", "fmqm_p10", "patches", "samples", "seconds",
+    "warnings", "notes", "error", "reverse", "level", "trust", "parts", "ref_texture", "texture", "settings",
+    "judge", "fail_under", "fail_under_p10",
 ]  # fmt: skip
 SETTING_FLAGS = [
     "samples", "patches", "scored-patches", "sigma", "radius", "gradient-radius", "normal-threshold",
@@ -171,7 +172,7 @@ def test_both_directions(assets: Path, tmp_path: Path) -> None:
     both, failed = read_json(tmp_path / "j")["pairs"]
     assert failed["reverse"] is None
     header, row, empty = (line.split() for line in done.stdout.replace("reverse FMQM", "reverse").splitlines())
-    assert header[-1] == "reverse" and row[-1] == f"{both['reverse']['FMQM']:.4f}" and empty[1:] == ["-"] * 6
+    assert header[-1] == "reverse" and row[-1] == f"{both['reverse']['FMQM']:.4f}" and empty[1:] == ["-"] * 7
     first, last = csv.DictReader((tmp_path / "c").read_text(encoding="utf-8").splitlines())
     assert [first[f"reverse {name}"] for name in COLUMNS] == [repr(value) for value in numbers(both["reverse"])]
     assert {last[f"reverse {name}"] for name in COLUMNS} == {""}
