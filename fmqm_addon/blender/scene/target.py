@@ -151,11 +151,11 @@ def _without_modifiers(
         others = [each for each in family if each != object_]
         result = asset_mesh([duplicate, *others], label, reading, duplicate, cache)
         found = result.mesh
-        warnings, notes = (
+        warnings, notes, objects = (
             tuple(text.replace(duplicate.name, object_.name, 1) for text in texts)
-            for texts in (found.warnings, found.notes)
+            for texts in (found.warnings, found.notes, found.objects)
         )
-        return replace(result, mesh=replace(found, warnings=warnings, notes=notes))
+        return replace(result, mesh=replace(found, warnings=warnings, notes=notes, objects=objects))
     except MeshError as error:
         raise MeshError(str(error).replace(duplicate.name, object_.name)) from error
     finally:
