@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from ..metric.evaluation import Result
-from .levels import MISSING, TRANSPARENCY
+from .impairment import MISSING, TRANSPARENCY
 from .surface_facts import Fact
 
 # Shares.

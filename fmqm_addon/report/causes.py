@@ -8,7 +8,7 @@ from typing import Any
 
 from ..comparison.color_shift import JUST_NOTICEABLE
 from ..comparison.doubts import COLOR_SHIFT
-from ..comparison.levels import MISSING
+from ..comparison.impairment import MISSING
 
 _LOW = 0.97  # a feature below it asks for a cause
 _FEWER = 0.75  # of the reference's triangles: few enough to be the cause

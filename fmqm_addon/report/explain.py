@@ -10,7 +10,7 @@ import numpy as np
 
 from ..comparison.color_shift import JUST_NOTICEABLE
 from ..comparison.doubts import LEAST_COVERED
-from ..comparison.levels import LEVELS, capped_by, level_of
+from ..comparison.impairment import IMPAIRMENTS, capped_by, impairment_of
 from ..comparison.places import place_name
 from ..metric.evaluation import Result
 from ..metric.perceived import PERCEIVED_COLUMNS
@@ -21,7 +21,8 @@ SEED_NOISE = 0.01  # FMQM of other seeds differs by less than this
 PERCEIVED_NOISE = 0.002  # and perceived by less than this
 FEW_PATCHES = 100  # a score of fewer is a quick look
 _FOOTNOTE = (
-    f"Levels: {', '.join(f'{words} (perceived from {least:g} on)' for least, words in LEVELS[:-1])}, {LEVELS[-1][1]}; "
+    f"Levels: {', '.join(f'{words} (perceived from {least:g} on)' for least, words in IMPAIRMENTS[:-1])}, "
+    f"{IMPAIRMENTS[-1][1]}; "
     "they were fitted on human scores of one model, an orientation, and facts that perceived does not see lower them. "
     f"Other random samples move FMQM by up to {SEED_NOISE:g} and perceived by up to {PERCEIVED_NOISE:g}: smaller "
     "differences say nothing."
@@ -97,8 +98,8 @@ def _verdict(record: Mapping[str, Any], facts: Facts) -> str:
     score, names = record["perceived"]["score"], (record["distorted"], record["reference"])
     caps = capped_by(score, facts.pair)
     but = f", but {_joined(caps)}" if caps else ""
-    level = level_of(score, facts.pair)
-    if level != LEVELS[0][1]:
+    level = impairment_of(score, facts.pair)
+    if level != IMPAIRMENTS[0][1]:
         return f"{names[0]} differs from {names[1]}: {level} (perceived {_short(score)}{but})."
     if record["warnings"]:
         return f"What differs between {names[0]} and {names[1]} is {level} (perceived {_short(score)})."

@@ -9,8 +9,8 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, NoReturn
 
+from ..comparison.impairment import IMPAIRMENTS
 from ..comparison.judge import Judge
-from ..comparison.levels import LEVELS
 from ..metric.perceived import Perceived
 from .explain import explain
 from .records import RECORD_KEYS, SHOWN, STAGES
@@ -219,6 +219,6 @@ _KINDS: dict[str, Any] = {
     "pictures": _is_pictures,
     "attribution": lambda value: value is None or is_attribution(value),
     "trust": lambda value: value is None or is_trust(value),
-    "level": lambda value: value is None or value in {words for _, words in LEVELS},
+    "impairment": lambda value: value is None or value in {words for _, words in IMPAIRMENTS},
     "parts": lambda value: _is_list(value, is_part),
 }

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from itertools import chain
 from typing import Any, NamedTuple
 
-from ..comparison.levels import level_of
+from ..comparison.impairment import impairment_of
 from ..comparison.measurement import Readings
 from ..metric.errors import one_line
 from ..metric.evaluation import COLUMNS, Scores
@@ -175,16 +175,16 @@ def pair_record(pair: PairScore) -> dict[str, Any]:
         "level": pair.level,
         **(dict.fromkeys(Costs._fields) if pair.costs is None else pair.costs._asdict()),
         "reverse": None if pair.reverse is None else _read(pair.reverse),
-        "level": None if pair.readings is None else _level(pair.readings, pair.trust),
+        "impairment": None if pair.readings is None else _impairment(pair.readings, pair.trust),
         "trust": pair.trust,
         "parts": list(pair.parts),
         **pair.findings,
     }
 
 
-def _level(readings: Readings, trust: Report | None) -> str:
+def _impairment(readings: Readings, trust: Report | None) -> str:
     facts = {} if trust is None else {name: item["value"] for name, item in trust["pair"].items()}
-    return level_of(readings.perceived.score, facts)
+    return impairment_of(readings.perceived.score, facts)
 
 
 def value_of(record: Mapping[str, Any], column: str) -> float | None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fmqm_addon.comparison.levels import level_of
+from fmqm_addon.comparison.impairment import impairment_of
 from fmqm_addon.comparison.places import place_name
 from fmqm_addon.report.explain import explain, footnote
 
@@ -128,7 +128,7 @@ def test_a_cause_is_not_named_where_another_one_is_known() -> None:
     ],
 )
 def test_facts_cap_the_level_and_the_words(known: dict[str, Any], level: str) -> None:
-    assert level_of(1.0, known) == level and level_of(0.5, known) == "very annoying"
+    assert impairment_of(1.0, known) == level and impairment_of(0.5, known) == "very annoying"
     told = explain(record(1.0, (1.0,) * 4, trust=facts(**known)))
     assert ("cannot be told from" in told) == (level == "imperceptible") and (", but " in told) == (
         level != "imperceptible"

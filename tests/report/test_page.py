@@ -49,7 +49,7 @@ def record(distorted: str = "lod.glb", score: float | None = 0.5, **others: Any)
         | {
             **ANYTHING.record_fields(),
             "warnings": [],
-            "level": None,
+            "impairment": None,
             "parts": [],
             "patches": 250,
             "notes": [],

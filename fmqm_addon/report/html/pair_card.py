@@ -32,7 +32,7 @@ def pair_card(number: int, record: Record, name: str) -> str:
     parts = [
         f'<div class="title"><div><h3>{text(name)}</h3>{whole_path}</div>'
         f'<p class="score"><span class="faint">{judge.column}</span> {score(record, judge.column)}'
-        f"{_level(record)}</p></div>",
+        f"{_impairment(record)}</p></div>",
         f'<p class="bad">Too low: {missed}.</p>' if (missed := shortfall(record)) else "",
     ]
     if record["error"]:
@@ -61,8 +61,8 @@ def pair_card(number: int, record: Record, name: str) -> str:
     return f'<article class="card" id="pair-{number}">{"".join(parts)}</article>\n'
 
 
-def _level(record: Record) -> str:
-    return f'<br><span class="faint">{escape(record["level"])}</span>' if record["level"] else ""
+def _impairment(record: Record) -> str:
+    return f'<br><span class="faint">{escape(record["impairment"])}</span>' if record["impairment"] else ""
 
 
 def _numbers(record: Record, columns: Iterable[str]) -> str:

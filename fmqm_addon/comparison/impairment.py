@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The level of a difference in words, from perceived and from the facts that it does not see.
+"""The impairment of a pair, the level of a difference in words, from perceived and from the facts that it does not see.
 
 The words are those of the impairment scale of ITU-R BT.500, on which human scores were given; where they begin was
 fitted on one model: an orientation.
@@ -12,37 +12,37 @@ from typing import Any
 
 from .color_shift import JUST_NOTICEABLE
 
-LEVELS = (
+IMPAIRMENTS = (
     (0.98, "imperceptible"),
     (0.95, "perceptible side by side, not annoying"),
     (0.88, "slightly annoying"),
     (0.80, "annoying"),
     (0.0, "very annoying"),
 )
-_SIDE_BY_SIDE, _SLIGHTLY = 1, 2  # rows of LEVELS that facts cap at
+_SIDE_BY_SIDE, _SLIGHTLY = 1, 2  # rows of IMPAIRMENTS that facts cap at
 LARGE_COLOR_SHIFT = 10.0  # slightly annoying at best
 MISSING = 0.005  # share of the reference's area that is gone; holes
 TRANSPARENCY = 0.01  # share of samples that one mesh shows and the other does not
 
 
-def level_of(perceived: float, facts: Mapping[str, Any]) -> str:
+def impairment_of(perceived: float, facts: Mapping[str, Any]) -> str:
     """The level of a pair.
 
     Args:
         perceived: of the pair, in [0, 1]. facts: values of the pair's facts by name; those that are not known cap
             nothing.
     """
-    by_score = next((row for row, (least, _) in enumerate(LEVELS) if perceived >= least), len(LEVELS) - 1)
-    return LEVELS[max([by_score, *(row for row, _ in _caps(facts))])][1]
+    by_score = next((row for row, (least, _) in enumerate(IMPAIRMENTS) if perceived >= least), len(IMPAIRMENTS) - 1)
+    return IMPAIRMENTS[max([by_score, *(row for row, _ in _caps(facts))])][1]
 
 
 def capped_by(perceived: float, facts: Mapping[str, Any]) -> list[str]:
     """The facts, in words, that put a pair lower than perceived alone would, or would if it were higher."""
-    return [words for row, words in _caps(facts) if perceived >= LEVELS[row - 1][0]]
+    return [words for row, words in _caps(facts) if perceived >= IMPAIRMENTS[row - 1][0]]
 
 
 def _caps(facts: Mapping[str, Any]) -> list[tuple[int, str]]:
-    """The best row of LEVELS that each fact allows, and the fact in words."""
+    """The best row of IMPAIRMENTS that each fact allows, and the fact in words."""
     caps = []
     gone = facts.get("missing_parts_count") or 0
     if gone:
