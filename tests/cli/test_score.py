@@ -32,8 +32,8 @@ from tests.blender.script import (
 
 PAIR_KEYS = [
     "id", "reference", "distorted", *COLUMNS, "perceived", "stderr", "fmqm_p10", "patches", "samples", "seconds",
-    "warnings", "notes", "error", "reverse", "level", "trust", "parts", "ref_texture", "texture", "settings",
-    "judge", "fail_under", "fail_under_p10",
+    "warnings", "notes", "error", "level", "triangles", "triangle_share", "texture_bytes", "reverse", "impairment",
+    "trust", "parts", "ref_texture", "texture", "settings", "judge", "fail_under", "fail_under_p10",
 ]  # fmt: skip
 SETTING_FLAGS = [
     "samples", "patches", "scored-patches", "sigma", "radius", "gradient-radius", "normal-threshold",
@@ -100,9 +100,9 @@ def test_endings_in_capitals(assets: Path, tmp_path: Path) -> None:
 
 def test_table(whole: Path) -> None:
     header, row = (line.split() for line in (whole / "stdout").read_text(encoding="utf-8").splitlines())
-    assert header == ["id", *COLUMNS] and row[0] == "shaken.obj"
+    assert header == ["id", *COLUMNS, "perceived"] and row[0] == "shaken.obj"
     pair = read_json(whole / "all.json")["pairs"][0]
-    assert row[1:] == [f"{value:.4f}" for value in numbers(pair)]
+    assert row[1:] == [f"{value:.4f}" for value in (*numbers(pair), pair["perceived"]["score"])]
 
 
 def test_json_has_exactly_the_promised_keys(whole: Path) -> None:
@@ -190,10 +190,15 @@ def test_seconds_add_up(whole: Path) -> None:
 
 def test_csv(whole: Path) -> None:
     rows = list(csv.reader((whole / "all.csv").read_text(encoding="utf-8").splitlines()))
-    assert rows[0] == ["id", "reference", "distorted", *COLUMNS, "error"]
+    second = ["perceived", "shape", "facing", "color", "detail", "perceived_p10"]
+    beside = ["triangles", "triangle_share", "texture_bytes", "level", "notes", "warnings"]
+    assert rows[0] == ["id", "reference", "distorted", *COLUMNS, *second, "error", *beside]
     pair = read_json(whole / "all.json")["pairs"][0]
+    perceived = [pair["perceived"][name] for name in ("score", "shape", "facing", "color", "detail", "p10")]
+    costs = [str(pair["triangles"]), repr(pair["triangle_share"]), str(pair["texture_bytes"])]
     assert len(rows) == 2
-    assert rows[1] == ["shaken.obj", "ref.obj", "shaken.obj", *(repr(value) for value in numbers(pair)), ""]
+    values = [repr(value) for value in (*numbers(pair), *perceived)]
+    assert rows[1] == ["shaken.obj", "ref.obj", "shaken.obj", *values, "", *costs, "", " | ".join(pair["notes"]), ""]
 
 
 def test_fields_have_the_promised_names_types_and_shapes(whole: Path) -> None:
@@ -531,7 +536,7 @@ def test_a_bad_file_costs_only_itself(assets: Path, whole: Path, tmp_path: Path)
         assert pair["stderr"] is pair["patches"] is pair["samples"] is pair["trust"] is None
         row = rows[names.index(name)]
         assert row["error"] == pair["error"] and {row[column] for column in COLUMNS} == {""}
-        assert table[names.index(name)].split() == [name, *"-----"]
+        assert table[names.index(name)].split() == [name, *"------"]
     assert "nowhere.png" in pairs["broken.obj"]["error"]
 
 
