@@ -182,6 +182,8 @@ def generate(wanted: str, path: str) -> None:
     """A bumpy torus with a generated texture, as .blend: about so many triangles."""
     import bpy
 
+    from fmqm_addon.blender import arrays
+
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     around = round((int(wanted) / 4) ** 0.5 * 2)
     rows = around // 2
@@ -195,19 +197,14 @@ def generate(wanted: str, path: str) -> None:
     quads = np.stack([index, right, np.roll(right, -1, 1), up], axis=-1).reshape(-1, 4)
     corner = np.stack([np.stack([u + i / around, v + j / rows], -1) for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))], 2)
     mesh = bpy.data.meshes.new("torus")
-    mesh.vertices.add(len(positions))
-    mesh.vertices.foreach_set("co", positions.astype(np.float32).ravel())
-    mesh.loops.add(quads.size)
-    mesh.loops.foreach_set("vertex_index", quads.astype(np.int32).ravel())
-    mesh.polygons.add(len(quads))
-    mesh.polygons.foreach_set("loop_start", np.arange(0, quads.size, 4, dtype=np.int32))
-    mesh.uv_layers.new(name="UVMap").uv.foreach_set("vector", corner.astype(np.float32).ravel())
+    arrays.fill(mesh, positions, quads)
+    arrays.write(mesh.uv_layers.new(name="UVMap").uv, "vector", corner.astype(np.float32))
     mesh.update(calc_edges=True)
     object_ = bpy.data.objects.new("torus", mesh)
     bpy.context.scene.collection.objects.link(object_)
     image = bpy.data.images.new("noise", 1024, 1024)
     pixels = np.random.default_rng(0).random((64, 64, 4), np.float32).repeat(16, 0).repeat(16, 1)
-    image.pixels.foreach_set(pixels.ravel())
+    arrays.write_pixels(image, pixels)
     image.pack()
     material = bpy.data.materials.new("noise")
     if material.node_tree is None:  # 5.0 and later always have one

@@ -30,6 +30,8 @@ except FMQMError as reason:
     sys.exit(f"demo.py: {reason}")
 import bpy
 
+from fmqm_addon.blender import arrays
+
 LOD_RATIO = 0.06
 LOD_JPEG_QUALITY = 10
 
@@ -40,7 +42,7 @@ def save_picture(pixels: NDArray[np.float32], path: Path, file_format: str, qual
     canvas = bpy.data.images.new(path.stem, width, height)
     rgba = np.ones((height, width, 4), np.float32)
     rgba[..., :3] = pixels
-    canvas.pixels.foreach_set(rgba.ravel())
+    arrays.write_pixels(canvas, rgba)
     canvas.file_format = file_format
     canvas.save(filepath=str(path), quality=quality)
     bpy.data.images.remove(canvas)
@@ -52,7 +54,7 @@ def build_object(line: Outline) -> bpy.types.Object:
     vertices, faces, uv = build_urn(line)
     mesh = bpy.data.meshes.new("urn")
     mesh.from_pydata(vertices.tolist(), [], faces)
-    mesh.uv_layers.new(name="UVMap").uv.foreach_set("vector", uv.astype(np.float32).ravel())
+    arrays.write(mesh.uv_layers.new(name="UVMap").uv, "vector", uv.astype(np.float32))
     mesh.shade_smooth()
     urn = bpy.data.objects.new("urn", mesh)
     bpy.context.scene.collection.objects.link(urn)

@@ -35,13 +35,20 @@ def read_attribute(mesh: bpy.types.Mesh, name: str, key: str, channels: int, dty
     return read(mesh.attributes[name].data, key, channels, dtype)
 
 
-def add_triangles(mesh: bpy.types.Mesh, triangles: NDArray[np.int32]) -> None:
-    """Gives a mesh that has vertices and no faces these (T, 3) triangles."""
-    mesh.loops.add(triangles.size)
+def fill(mesh: bpy.types.Mesh, positions: NDArray[Any], faces: NDArray[Any]) -> None:
+    """Gives a mesh that is empty (V, 3) vertices and (F, k) faces, all of k corners."""
+    mesh.vertices.add(len(positions))
+    write(mesh.attributes["position"].data, "vector", positions.astype(np.float32, copy=False))
+    add_faces(mesh, faces)
+
+
+def add_faces(mesh: bpy.types.Mesh, faces: NDArray[Any]) -> None:
+    """Gives a mesh that has vertices and no faces these (F, k), all of k corners."""
+    mesh.loops.add(faces.size)
     # Through the attribute this is a copy of memory; through the loops a hundred times slower.
-    write(mesh.attributes[".corner_vert"].data, "value", triangles)
-    mesh.polygons.add(len(triangles))
-    write(mesh.polygons, "loop_start", np.arange(0, triangles.size, 3, dtype=np.int32))
+    write(mesh.attributes[".corner_vert"].data, "value", faces.astype(np.int32, copy=False))
+    mesh.polygons.add(len(faces))
+    write(mesh.polygons, "loop_start", np.arange(0, faces.size, faces.shape[1], dtype=np.int32))
 
 
 def read_pixels(image: bpy.types.Image) -> NDArray[np.float32]:

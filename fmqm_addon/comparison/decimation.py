@@ -297,10 +297,10 @@ def decimating(
 
 
 def _decimating(search: Search, goal: DecimationGoal) -> Work[DecimationResult]:
-    yield from as_share(search.prepare(), 0.0, _PREPARED)
+    yield from as_part(search.prepare(), 0.0, _PREPARED)
     ratios = search.ratios(goal.max_triangles)
     if goal.max_triangles is not None:
-        ratios = yield from as_share(search.within(ratios, goal.max_triangles), _PREPARED, 0.0)
+        ratios = yield from as_part(search.within(ratios, goal.max_triangles), _PREPARED, 0.0)
     parts = max(1, len(goal.targets)) * (1 + (goal.texture_target is not None))
     share = (1 - _PREPARED) / parts
     results: list[TargetResult] = []
@@ -308,22 +308,11 @@ def _decimating(search: Search, goal: DecimationGoal) -> Work[DecimationResult]:
         first = _PREPARED + share * parts * number / max(1, len(goal.targets))
         geometry, texture, ratio = None, None, 1.0
         if target is not None:
-            geometry = yield from as_share(search.find(target, ratios, goal.judge), first, share)
+            geometry = yield from as_part(search.find(target, ratios, goal.judge), first, share)
             ratio = geometry.best.version.ratio
         if goal.texture_target is not None and (geometry is None or geometry.reached):
             versions = [Version(ratio), *(Version(ratio, size) for size in goal.texture_sizes[1:])]
             searching = search.find(goal.texture_target, versions, goal.judge)
-            texture = yield from as_share(searching, first + share, share)
+            texture = yield from as_part(searching, first + share, share)
         results.append(TargetResult(geometry, texture))
     return DecimationResult(tuple(results), search.triangles, search.warnings, search.notes)
-
-
-def as_share(work: Work[T], first: float, share: float) -> Work[T]:
-    """Work as a part of larger work."""
-    while True:
-        try:
-            progress = next(work)
-        except StopIteration as end:
-            result: T = end.value
-            return result
-        yield Progress(progress.stage, first + share * progress.done)

@@ -13,7 +13,7 @@ from ..metric.evaluation import Evaluation, Result, Scores
 from ..metric.geometry import Floats
 from ..metric.perceived import Perceived
 from ..metric.settings import Settings
-from ..metric.stepper import Progress, Stepper, Work, as_part, as_work
+from ..metric.stepper import Progress, Stepper, Work, as_part
 from ..metric.surface import MeshArrays, QueryBuilder, Surface, preparing_surface
 from .parts import Grouping, groupings
 from .surface_facts import Fact, surface_facts
@@ -105,7 +105,7 @@ class Measurement:
 
     def _prepare(self) -> Work[None]:
         yield Progress("prepare", 0.0)
-        surface = yield from as_work(preparing_surface(self._mesh, self._build_query), "prepare", 0.0, 0.05)
+        surface = yield from as_part(preparing_surface(self._mesh, self._build_query), 0.0, 0.05, "prepare")
         yield Progress("prepare", 0.05)
         for repeat in range(self._repeats):
             evaluation = Evaluation(surface, self._settings.with_seed(self._settings.seed + repeat))
@@ -115,10 +115,10 @@ class Measurement:
     def _compare(self, distorted: MeshArrays, known: Sequence[Fact]) -> Work[Comparison]:
         surface, results = yield from self._results(distorted, 0.0, 0.92)
         if not self._facts:
-            self._facts = yield from as_work(surface_facts(self.reference), "features", 0.92, 0.95)
-            self._groups = yield from as_work(groupings(self.reference), "features", 0.95, 0.96)
+            self._facts = yield from as_part(surface_facts(self.reference), 0.92, 0.03, "features")
+            self._groups = yield from as_part(groupings(self.reference), 0.95, 0.01, "features")
         assessed = assessing(self.reference, surface, results[0], self._facts, self._groups)
-        trust = yield from as_work(assessed, "features", 0.96, 1.0)
+        trust = yield from as_part(assessed, 0.96, 0.04, "features")
         readings = _means(results)
         return Comparison(
             **vars(readings),
@@ -137,7 +137,7 @@ class Measurement:
         """The prepared mesh and its result for each seed; progress goes from first on by the share."""
         yield Progress("prepare", first)
         preparing = preparing_surface(distorted, self._build_query, self.reference.frame)
-        surface = yield from as_work(preparing, "prepare", first, first + 0.05 * share)
+        surface = yield from as_part(preparing, first, 0.05 * share, "prepare")
         yield Progress("prepare", first + 0.05 * share)
         results = []
         each = 0.95 * share / self._repeats

@@ -3,15 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import fields, is_dataclass
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
-
 from ..metric.settings import Settings
 from ..metric.surface import MeshArrays
+from ..metric.texture import image_arrays
 
 # Fitted to the peaks of score.py on pairs of 0.5 and 2 million triangles, with 2 and 4 values a corner.
 _BLENDER = 320e6  # bytes of an empty session with numpy
@@ -34,7 +28,7 @@ def peak_bytes(
     triangles = sum(
         len(mesh.triangles) * (_PER_TRIANGLE + _PER_CORNER_VALUE * mesh.corners.shape[2]) for mesh in meshes
     )
-    images = {id(array): array.nbytes for mesh in meshes for look in mesh.materials for array in _arrays(look)}
+    images = {id(array): array.nbytes for mesh in meshes for look in mesh.materials for array in image_arrays(look)}
     return _BLENDER + triangles + sum(images.values()) + _PER_SAMPLE * settings.samples * repeats
 
 
@@ -44,17 +38,3 @@ def peak_text(reference: MeshArrays, settings: Settings, repeats: int = 1) -> st
     return (
         f"{reference.name}: {len(reference.triangles):,} triangles; about {size:.1f} GB of memory for two such meshes"
     )
-
-
-def _arrays(value: Any) -> Iterator[NDArray[Any]]:
-    """The arrays that a material's samplers hold."""
-    if isinstance(value, np.ndarray):
-        yield value
-    elif is_dataclass(value):
-        for field in fields(value):
-            yield from _arrays(getattr(value, field.name))
-    elif isinstance(value, (tuple, list)):
-        for item in value:
-            yield from _arrays(item)
-    elif isinstance(value, dict):
-        yield from _arrays(list(value.values()))

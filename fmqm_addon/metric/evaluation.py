@@ -31,7 +31,7 @@ from .perceived import (
 )
 from .sampling import Samples, draw_samples, join_samples
 from .settings import Settings
-from .stepper import Progress, Stepper, Work, as_work
+from .stepper import Progress, Stepper, Work, as_part
 from .surface import Frame, MeshArrays, QueryBuilder, Surface, prepare_surface
 
 _PATCHES_AT_ONCE = 8  # some milliseconds of work
@@ -123,7 +123,7 @@ class Evaluation:
 
     def _prepare(self) -> Work[None]:
         settings = self.settings
-        mesh = yield from as_work(build_patch_mesh(self.reference, settings.patches), "prepare", 0.0, 0.05)
+        mesh = yield from as_part(build_patch_mesh(self.reference, settings.patches), 0.0, 0.05, "prepare")
         yield Progress("prepare", 0.05)
         chosen = []
         for center in choose_centers(mesh.vertices, settings):
@@ -151,13 +151,13 @@ class Evaluation:
             )
         reach = np.abs(samples.offset)  # a sample is this near to the face it was drawn on
         fields = evaluate_fields(self.reference, samples.positions, order, reach)
-        ref = yield from as_work(fields, "fields", 0.4, 1.0)
+        ref = yield from as_part(fields, 0.4, 0.6, "fields")
         self._prepared = _Prepared(mesh, tuple(patches), mesh.vertices[centers], samples, order, ref, tuple(notes))
 
     def _compare(self, prepared: _Prepared, distorted: Surface) -> Work[Result]:
         settings, samples = self.settings, prepared.samples
         fields = evaluate_fields(distorted, samples.positions, prepared.order)
-        dist = yield from as_work(fields, "fields", 0.0, 0.8)
+        dist = yield from as_part(fields, 0.0, 0.8, "fields")
         weights = channel_weights(settings.color_space)
         channels_r, channels_d = (channels(field.ncf, settings.color_space) for field in (prepared.ref, dist))
         diagonals = np.array([patch.diagonal for patch in prepared.patches])

@@ -53,14 +53,30 @@ def draw_samples(mesh: PatchMesh, patch: Patch, total_area: float, settings: Set
     upto = np.minimum(np.floor(expected + rng.random()).astype(np.int64), count)
     face = np.repeat(patch.faces, np.diff(upto, prepend=0))
 
-    root, second = np.sqrt(rng.random(count)), rng.random(count)
-    weights = np.stack([1 - root, root * (1 - second), root * second], axis=1)
+    weights = draw_barycentric(rng, count)
     offset = rng.normal(0.0, settings.sigma * patch.diagonal, count)
     corners = mesh.triangles[face]
     positions = np.einsum("nk,nkc->nc", weights, mesh.vertices[corners])
     positions += offset[:, None] * triangle_normals(mesh.vertices, corners)
     units = np.sort(rng.choice(count, min(settings.color_units, count), replace=False))
     return PatchSamples(positions, offset, face, units)
+
+
+def draw_barycentric(rng: np.random.Generator, count: int) -> Floats:
+    """(count, 3) barycentric coordinates, uniform over a triangle."""
+    root, second = np.sqrt(rng.random(count)), rng.random(count)
+    return np.stack([1 - root, root * (1 - second), root * second], axis=1)
+
+
+def triangles_evenly(areas: Floats, within: Floats) -> Ints:
+    """(n,) triangles, one for each of n equal shares of their area.
+
+    Args:
+        areas: (T,) of the triangles. within: (n,) where in its share each lies, in [0, 1).
+    """
+    total, count = np.cumsum(areas), len(within)
+    place = (np.arange(count) + within) * (total[-1] / count)
+    return np.minimum(np.searchsorted(total, place, side="right"), len(total) - 1)
 
 
 @dataclass(frozen=True)

@@ -52,8 +52,15 @@ class Stepper(Generic[T]):
         return more
 
     def run(self) -> T:
+        """All of it at once."""
         while self.step():
             pass
+        return self.result
+
+    def steps(self) -> Work[T]:
+        """Its progress after each step; ends in the result."""
+        while self.step():
+            yield self.progress
         return self.result
 
     def cancel(self) -> None:
@@ -61,19 +68,22 @@ class Stepper(Generic[T]):
         self._done = True
 
 
-def as_part(stepper: Stepper[T], first: float, share: float, stage: str | None = None) -> Work[T]:
-    """The steps of a stepper as a part of larger work, which may call all of them one stage; ends in its result."""
-    while stepper.step():
-        yield Progress(stage or stepper.progress.stage, first + share * stepper.progress.done)
-    return stepper.result
+def as_part(
+    part: Stepper[T] | Generator[Progress | float, None, T], first: float, share: float, stage: str | None = None
+) -> Work[T]:
+    """The steps of something smaller as a part of larger work; ends in its result.
 
-
-def as_work(work: Generator[float, None, T], stage: str, first: float, last: float) -> Work[T]:
-    """Something that yields its own share done, as the part of a stepper's work from first to last."""
+    Args:
+        part: a stepper, or a generator of its progress; one that knows no stages yields the share done alone.
+        first, share: where in the larger work it begins, and how much of that it is.
+        stage: what all of its steps are called; None: as it calls them.
+    """
+    work: Generator[Progress | float, None, T] = part.steps() if isinstance(part, Stepper) else part
     while True:
         try:
-            done = next(work)
+            step = next(work)
         except StopIteration as end:
             result: T = end.value
             return result
-        yield Progress(stage, first + (last - first) * done)
+        own = step if isinstance(step, Progress) else Progress("", step)
+        yield Progress(stage or own.stage, first + share * own.done)

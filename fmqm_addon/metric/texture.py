@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -258,6 +258,18 @@ class Tiles:
             here = np.flatnonzero((whole == place).all(axis=1))
             if here.size:
                 yield texture, here, uv[here] - place
+
+
+def image_arrays(part: object) -> Iterator[NDArray[Any]]:
+    """The pixels of every texture in a material, or in one of its samplers, whatever it is mixed from."""
+    if isinstance(part, Texture):
+        yield part.pixels
+    elif isinstance(part, tuple):
+        for item in part:
+            yield from image_arrays(item)
+    elif is_dataclass(part):
+        for field in fields(part):
+            yield from image_arrays(getattr(part, field.name))
 
 
 def _weighted_row(flat: NDArray[Any], start: NDArray[np.int64], columns: list[tuple[NDArray[np.int64], Any]]) -> Floats:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Generator
 
-from fmqm_addon.metric.stepper import Progress, Stepper
+from fmqm_addon.metric.stepper import Progress, Stepper, as_part
 
 
 def counting() -> Generator[Progress, None, int]:
@@ -26,3 +26,17 @@ def test_a_result_stays() -> None:
     stepper.run()
     stepper.step()
     assert stepper.result == 7
+
+
+def sharing() -> Generator[float, None, str]:
+    yield 0.5
+    return "done"
+
+
+def test_all_that_yields_progress_can_be_a_part() -> None:
+    """A stepper, a generator of its progress, and one that only tells its share."""
+    for part, stage, result in ((counting(), "half", 7), (Stepper(counting()), "half", 7), (sharing(), "", "done")):
+        stepper = Stepper(as_part(part, 0.25, 0.5))
+        assert stepper.step() and stepper.progress == Progress(stage, 0.5)
+        assert stepper.run() == result
+    assert next(as_part(sharing(), 0.0, 1.0, "mine")) == Progress("mine", 0.5)

@@ -278,7 +278,7 @@ def _triangles(source: bpy.types.Mesh, parts: list[_Part], temporary: ExitStack)
     mesh = bpy.data.meshes.new("FMQM bake")
     temporary.callback(bpy.data.meshes.remove, mesh)
     mesh.vertices.add(len(source.vertices))
-    arrays.add_triangles(mesh, triangles)
+    arrays.add_faces(mesh, triangles)
     for attribute in source.attributes:
         if attribute.name[0] != "." and attribute.domain in kept and attribute.data_type in _VALUES:
             _store(

@@ -220,9 +220,7 @@ def _cloud_mesh(name: str, positions: Floats, normals: Floats, size: float) -> b
 def _mesh(name: str, vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> bpy.types.Mesh:
     """A smooth mesh with a white color attribute."""
     mesh = bpy.data.meshes.new(name)
-    mesh.vertices.add(len(vertices))
-    arrays.write(mesh.attributes["position"].data, "vector", vertices)
-    arrays.add_triangles(mesh, triangles)
+    arrays.fill(mesh, vertices, triangles)
     mesh.color_attributes.new(COLOR, "FLOAT_COLOR", "POINT")
     mesh.color_attributes.active_color_index = 0
     mesh.color_attributes.render_color_index = 0

@@ -63,9 +63,7 @@ def _build_tree(vertices: Floats, triangles: Ints) -> BVHTree:
     """A tree by way of a temporary mesh that no scene sees: seven times faster than from Python lists."""
     mesh = bpy.data.meshes.new("FMQM tree")
     try:
-        mesh.vertices.add(len(vertices))
-        arrays.write(mesh.attributes["position"].data, "vector", vertices.astype(np.float32))
-        arrays.add_triangles(mesh, triangles.astype(np.int32))
+        arrays.fill(mesh, vertices, triangles)
         owner = bpy.data.objects.new("FMQM tree", mesh)
         try:
             return BVHTree.FromObject(owner, bpy.context.evaluated_depsgraph_get(), deform=False)

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...metric.geometry import Floats
+from .. import arrays
 from ..materials.image_files import image_paths
 from .members import collection_members, instanced, instances_of, metaball_family
 from .target import Target
@@ -170,8 +171,7 @@ class _Walk:
             if known is None or name == _NORMALS or (name.startswith(".") and name not in _TOPOLOGY):
                 continue
             key, width, kind = known
-            values: NDArray[Any] = np.empty(len(attribute.data) * width, kind)
-            attribute.data.foreach_get(key, values)
+            values = arrays.read(attribute.data, key, width, kind)
             # Blender keeps attributes of nothing but zeros or not, as it likes.
             if attribute.data_type in _SHOWN_ATTRIBUTES or values.any():
                 self.add(name, attribute.domain, attribute.data_type)
@@ -193,9 +193,7 @@ class _Walk:
 
     def _add_points(self, points: Any, kind: type = np.float32, **widths: int) -> None:
         for key, width in widths.items():
-            values: NDArray[Any] = np.empty(len(points) * width, kind)
-            points.foreach_get(key, values)
-            self.add_array(values)
+            self.add_array(arrays.read(points, key, width, kind))
 
     def add_steps(self, values: Floats) -> None:
         """Numbers up to rounding, which differs where things are moved together."""
@@ -335,9 +333,7 @@ def _image_state(image: bpy.types.Image) -> list[Any]:
     if image.is_dirty and len(image.pixels) > _MOST_PAINTED:
         known.append("painted")
     elif image.is_dirty:
-        pixels: NDArray[np.float32] = np.empty(len(image.pixels), np.float32)
-        image.pixels.foreach_get(pixels)
-        known.append(crc32(pixels.data))
+        known.append(crc32(arrays.read_pixels(image).data))
     elif image.packed_files:
         known += [file.packed_file.size for file in image.packed_files if file.packed_file is not None]
     elif image.source == "GENERATED":

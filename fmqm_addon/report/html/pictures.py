@@ -6,19 +6,17 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import fields, is_dataclass
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...comparison.judge import Judge
 from ...metric.errors import FileError, OutputError
 from ...metric.evaluation import Result
 from ...metric.surface import Surface
-from ...metric.texture import Texture
+from ...metric.texture import image_arrays
 from ..atomic_files import check_writable, replaced
 from ..render import (
     Camera,
@@ -148,21 +146,9 @@ def texture_bytes(surface: Surface) -> int:
     images = {
         id(pixels): pixels.shape[0] * pixels.shape[1] * BYTES_PER_PIXEL
         for material in surface.materials
-        for pixels in _images((material.color, material.alpha))
+        for pixels in image_arrays(material)
     }
     return sum(images.values())
-
-
-def _images(part: object) -> Iterator[NDArray[Any]]:
-    """The pixels of every texture in a material's color, whatever it is mixed from."""
-    if isinstance(part, Texture):
-        yield part.pixels
-    elif isinstance(part, tuple):
-        for item in part:
-            yield from _images(item)
-    elif is_dataclass(part):
-        for field in fields(part):
-            yield from _images(getattr(part, field.name))
 
 
 def _write(folder: str, stem: str, view: Pixels) -> str:

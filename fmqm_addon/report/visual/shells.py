@@ -9,6 +9,7 @@ import numpy as np
 
 from ...metric.fields import Fields, evaluate_fields
 from ...metric.geometry import Floats, Ints, morton_order
+from ...metric.sampling import draw_barycentric, triangles_evenly
 from ...metric.surface import Surface, finish, triangle_areas, triangle_normals
 
 SHELLS = 5  # as in the supplement's figure
@@ -39,14 +40,10 @@ def shell_points(surface: Surface, count: int, distance: float, seed: int = 0) -
     Args:
         count: of each shell. distance: between shells in units of the frame; the first is the surface.
     """
-    areas = np.cumsum(triangle_areas(surface.vertices, surface.triangles))
     rng = np.random.default_rng(seed)
-    place = (np.arange(count) + rng.random()) * (areas[-1] / count)
-    triangle = np.minimum(np.searchsorted(areas, place, side="right"), len(areas) - 1)
-    root, second = np.sqrt(rng.random(count)), rng.random(count)
-    weights = np.stack([1 - root, root * (1 - second), root * second], axis=1)
-    corners = surface.triangles[triangle]
-    base = np.einsum("nk,nkc->nc", weights, surface.vertices[corners])
+    areas = triangle_areas(surface.vertices, surface.triangles)
+    corners = surface.triangles[triangles_evenly(areas, np.full(count, rng.random()))]
+    base = np.einsum("nk,nkc->nc", draw_barycentric(rng, count), surface.vertices[corners])
     normals = triangle_normals(surface.vertices, corners)
     positions = np.concatenate([base + k * distance * normals for k in range(SHELLS)])
     return Shells(positions, np.repeat(np.arange(SHELLS), count), np.tile(normals, (SHELLS, 1)))

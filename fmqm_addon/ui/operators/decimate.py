@@ -113,13 +113,10 @@ def _why_not(context: bpy.types.Context) -> str:
 
 def _attempt(read: VersionReader, goal: DecimationGoal, settings: Settings) -> Work[DecimationResult | FMQMError]:
     """The search, or why it could not be done."""
-    searching = decimating(read, BVHQuery, goal, settings)
     try:
-        while searching.step():
-            yield searching.progress
+        return (yield from decimating(read, BVHQuery, goal, settings).steps())
     except FMQMError as error:
         return error
-    return searching.result
 
 
 def _write_path(decimate: FMQMDecimate, name: str, found: SearchResult, judge: Judge) -> None:
