@@ -22,7 +22,7 @@ from .. import arrays
 from ..materials.expressions import ImageAlpha, Opacity
 from ..materials.types import Look, MeshLayer, Unread
 from .atlas import LARGEST, Layout, new_layout, own_layout
-from .emission import BakePass, emission_copy, is_opaque
+from .emission import BakePass, emission_copy, is_opaque, keeps_shaders, shines
 
 _MARGIN = 8  # pixels around the parts of an own UV map, for bilinear lookups at their edges
 _ROWS = 256  # of an image that are worked on at a time
@@ -138,6 +138,11 @@ def _bake(
         return [_pixels(part.image) for part in parts]
 
     colors = draw(BakePass.COLOR)
+    materials = [slots[part.slot][0].original for part in parts]
+    if any(keeps_shaders(each) and shines(each.node_tree) for each in materials):
+        for color, own, material in zip(colors, draw(BakePass.OWN), materials, strict=True):
+            if keeps_shaders(material):
+                color[:, :, :3] -= own[:, :, :3]
     opaque = all(is_opaque(slots[part.slot][0].node_tree) for part in parts)
     weights = [None] * len(parts) if opaque else draw(BakePass.WEIGHT)
     return {

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from math import inf
 from typing import Any
@@ -172,14 +172,8 @@ def upstream(start: NestedSocket) -> Iterator[tuple[bpy.types.Node, str]]:
         yield place.node, role
 
 
-def upstream_outputs(
-    start: NestedSocket, dropped: Callable[[NestedSocket], Iterable[bpy.types.NodeSocket]] = lambda _: ()
-) -> Iterator[tuple[NestedSocket, str]]:
-    """Every output that an input depends on, with its role.
-
-    Args:
-        dropped: of an output, the inputs of its node that are not followed.
-    """
+def upstream_outputs(start: NestedSocket) -> Iterator[tuple[NestedSocket, str]]:
+    """Every output that an input depends on, with its role."""
     queue, seen = [(start, start.socket.name)], set()
     while queue:
         asking, role = queue.pop(0)
@@ -192,10 +186,7 @@ def upstream_outputs(
             continue
         seen.add(key)
         yield place, role
-        idle = set(dropped(place))
         for socket in place.node.inputs:
-            if socket in idle:
-                continue
             own = place.socket.type == "SHADER" and socket.type != "SHADER"
             queue.append((NestedSocket(socket, place.groups), _role(socket) if own else role))
 

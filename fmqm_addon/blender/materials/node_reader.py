@@ -22,7 +22,6 @@ from ...metric.texture import (
     Texture,
     Tiles,
 )
-from .cycles_alpha import merged, used_alphas
 from .expressions import (
     AVERAGE,
     CHANNELS,
@@ -61,6 +60,7 @@ from .image_files import (
 from .images import Pixels, TextureCache, black_warnings
 from .node_graph import NestedSocket, NotReadError, by_identifier, family, only_emits, source, upstream
 from .types import MeshLayer, Reading
+from .used_alpha import linked_alphas, opacity_alphas
 from .uv_nodes import is_mapped, is_of_mesh, placement_of
 
 MOST_NODES = 200  # of what feeds a base color; read trees are evaluated recursively
@@ -94,7 +94,7 @@ class MaterialReader:
         self._reading = reading
         self._nodes = 0
         self._lost: float | None = None  # what an image that is missing counts as in an opacity; None in colors
-        self._used_alphas = used_alphas(material)
+        self._alphas = linked_alphas(material, ("Surface", "Volume", "Displacement"))
 
     def look(self) -> tuple[Color, Alpha | None]:
         """The material's color and opacity.
@@ -364,13 +364,13 @@ class MaterialReader:
         )
 
     def _uses_alpha(self, place: NestedSocket) -> bool:
-        """Whether Cycles, which makes one node of equal ones, divides the color at an image's output by its alpha."""
-        return any(
-            same_content(place.node.image, other.node.image)
-            and not is_mapped(other.node.texture_mapping)
-            and merged(place, other)
-            for other in self._used_alphas
-        )
+        """Whether Cycles divides the color at an image's output by its alpha; NotReadError where that is not plain."""
+        node = place.node
+        if not any(same_content(node.image, other.node.image) for other in self._alphas):
+            return False
+        if any((other.node, other.groups) == (node, place.groups) for other in opacity_alphas(source(self._surface))):
+            return True
+        raise NotReadError(node, "has an alpha that is used, if not for its own opacity")
 
     def _tiles(self, place: NestedSocket, placement: Placement) -> Tiles | None:
         node, image = place.node, place.node.image
