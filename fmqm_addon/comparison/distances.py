@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..metric.fields import closest_on
-from ..metric.geometry import Floats, dot, morton_order
+from ..metric.geometry import Floats, Ints, dot, morton_order
+from ..metric.sampling import draw_barycentric, triangles_evenly
 from ..metric.surface import Surface, triangle_areas
 from .surface_facts import Work
 
@@ -61,15 +62,12 @@ def squared_distances(surface: Surface, points: Floats) -> Floats:
 
 def spread_points(surface: Surface, count: int, seed: int) -> Floats:
     """(count, 3) points on a surface, even over its area: one drawn in each of count equal shares of it."""
-    areas = np.cumsum(triangle_areas(surface.vertices, surface.triangles))
     rng = np.random.default_rng(seed)
-    place = (np.arange(count) + rng.random(count)) * (areas[-1] / count)
-    return points_at(surface, np.minimum(np.searchsorted(areas, place, side="right"), len(areas) - 1), rng)
+    areas = triangle_areas(surface.vertices, surface.triangles)
+    return points_at(surface, triangles_evenly(areas, rng.random(count)), rng)
 
 
-def points_at(surface: Surface, triangle: Floats, rng: np.random.Generator) -> Floats:
+def points_at(surface: Surface, triangle: Ints, rng: np.random.Generator) -> Floats:
     """A point, drawn evenly, on each of (n,) triangles."""
     corners = surface.triangles[triangle]
-    root, second = np.sqrt(rng.random(len(corners))), rng.random(len(corners))
-    weights = np.stack([1 - root, root * (1 - second), root * second], axis=1)
-    return np.asarray(np.einsum("nk,nkc->nc", weights, surface.vertices[corners]))
+    return np.asarray(np.einsum("nk,nkc->nc", draw_barycentric(rng, len(corners)), surface.vertices[corners]))
