@@ -107,7 +107,7 @@ class _Scorer:
 
     def score(self, group: Sequence[Task]) -> None:
         """Prepares the reference that the tasks share, and scores them one by one."""
-        from ..blender.scene.bvh import BVHQuery
+        from ..blender.scene.node_queries import surface_query
         from ..comparison.pair import measurement_of
 
         row = group[0].row
@@ -118,7 +118,7 @@ class _Scorer:
         try:
             reference = self._load(row, row.reference, row.ref_texture)
             self._note_memory(reference, options)
-            measurement = measurement_of(reference, BVHQuery, options)
+            measurement = measurement_of(reference, surface_query, options)
             self._work(measurement.prepare(), "preparing the reference")
         except Exception as error:
             failure = _reason(error, row.reference)

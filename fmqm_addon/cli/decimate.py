@@ -130,7 +130,7 @@ def _search(args: argparse.Namespace, targets: list[float], settings: Settings, 
         texture_sizes,
         written_reader,
     )
-    from ..blender.scene.bvh import BVHQuery
+    from ..blender.scene.node_queries import surface_query
     from ..comparison.decimation import DecimationGoal, decimating
     from ..report.atomic_files import check_writable, print_parts, write_text
 
@@ -148,7 +148,7 @@ def _search(args: argparse.Namespace, targets: list[float], settings: Settings, 
         sizes = () if args.target_texture is None else tuple(texture_sizes(args.reference, reading))
     goal = DecimationGoal(tuple(targets), args.max_triangles, args.target_texture, sizes, judge)
     written = written_reader(args.reference, outputs[0], reading) if outputs else None
-    stepper = decimating(file_reader(args.reference, reading), BVHQuery, goal, settings, written)
+    stepper = decimating(file_reader(args.reference, reading), surface_query, goal, settings, written)
     more = True
     while more:
         with defer_interrupts():

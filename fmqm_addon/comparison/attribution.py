@@ -15,8 +15,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..metric.fields import closest_on
 from ..metric.geometry import Floats, Ints
+from ..metric.queries import closest_on
 from ..metric.stepper import Progress, Stepper, Work, as_part
 from ..metric.surface import MeshArrays, Surface
 from ..metric.texture import Material

@@ -65,7 +65,7 @@ class Measurement:
     """A reference, prepared once for any number of comparisons.
 
     Args:
-        build_query: makes the spatial query of a surface; under Blender blender.scene.bvh.BVHQuery.
+        build_query: makes the spatial query of a surface; under Blender blender.scene.node_queries.surface_query.
         repeats: of each comparison, with the seeds settings.seed to settings.seed + repeats - 1.
     """
 

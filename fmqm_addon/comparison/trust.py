@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..metric.evaluation import Result
-from ..metric.fields import Fields, closest_on
+from ..metric.fields import Fields
 from ..metric.geometry import Floats, dot
+from ..metric.queries import closest_on
 from ..metric.surface import Surface, triangle_normals
 from ..metric.texture import MISSING, ImageFacts, Material
 from .color_shift import color_shifts

@@ -3,31 +3,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .geometry import Floats, Ints, closest_on_triangles, cross, dot, ranges
-from .surface import Surface, triangle_normals
+from .geometry import Floats, Ints, cross, dot, ranges
+from .queries import BatchQuery, as_share, closest_on, crossing_counts, nearest_triangles, opened
+from .signs import followers
+from .surface import Surface, is_closed, triangle_normals
 
 # Below the resolution of a float32 tree in a box of diagonal 1, p - p_n has no direction: p = p_n.
 ON_SURFACE = 1e-9
-# A ray goes on this far behind a hit, some float32 steps, so as not to find the same place again.
-RAY_STEP = 1e-6
-# Upper bounds get this much, relative and absolute, for the float32 arithmetic of a tree.
-BOUND_SLACK, BOUND_MARGIN = 1e-4, 1e-6
-# Every so many-th point is looked up first; its triangle bounds the distance of the points after it.
-_STRIDES = (64, 8, 1)
-_BATCH = 1024  # queries of a step
+# What two float32 trees may take for one distance, some roundings of a position.
+TIE = 5e-7
 _SURFACE_BATCH = 16384  # points of a step that asks no tree
 _CANDIDATES = 1 << 20  # faces around nearest points that are looked at at once: a fan's hub may have any number
-# Rays through a soup of overlapping triangles cross hundreds of them, and a tree is asked for each crossing, while
-# testing a ray against a triangle without a tree costs about 1 / 300 of a question.
-_PROBED_RAYS = 32
-_SOUP_CROSSINGS, _SOUP_SHARE = 16, 1 / 300  # crossings of a ray from which on it is one; and of the triangles
-_RAY_TESTS = 1 << 21  # rays times triangles of a step
 
 
 @dataclass(frozen=True)
@@ -60,119 +52,57 @@ def evaluate_fields(
     The tree says which triangle is nearest and what a ray hits; where on the triangle, and how far, is
     computed here in float64.
     """
-    triangle = yield from _nearest_triangles(surface, points, order, reach)
-    nearest = np.empty_like(points)
-    ncf = np.empty(points.shape, np.float32)
-    for first in range(0, len(order), _SURFACE_BATCH):
-        batch = order[first : first + _SURFACE_BATCH]
-        triangle[batch], nearest[batch], weights = _settled(surface, points[batch], triangle[batch])
-        ncf[batch] = surface.color_at(triangle[batch], weights)
-        yield 0.35 + 0.1 * (first + len(batch)) / len(order)
-    away = points - nearest
-    sdf = np.sqrt(dot(away, away))
-    on_surface = sdf <= ON_SURFACE
-    nearest[on_surface] = points[on_surface]
-    sdf[on_surface] = 0.0
+    with opened(surface.query):
+        triangle = yield from as_share(nearest_triangles(surface, points, order, reach), 0.0, 0.35)
+        again = surface.query.one_by_one if isinstance(surface.query, BatchQuery) else None
+        nearest = np.empty_like(points)
+        ncf = np.empty(points.shape, np.float32)
+        for first in range(0, len(order), _SURFACE_BATCH):
+            batch = order[first : first + _SURFACE_BATCH]
+            triangle[batch], nearest[batch], weights = _settled(surface, points[batch], triangle[batch], again)
+            ncf[batch] = surface.color_at(triangle[batch], weights)
+            yield 0.35 + 0.1 * (first + len(batch)) / len(order)
+        away = points - nearest
+        sdf = np.sqrt(dot(away, away))
+        on_surface = sdf <= ON_SURFACE
+        nearest[on_surface] = points[on_surface]
+        sdf[on_surface] = 0.0
 
-    off_surface = order[~on_surface[order]]
-    count, size = count_crossings, _BATCH
-    probe = off_surface[:: max(1, len(off_surface) // _PROBED_RAYS)]
-    if _is_soup(surface, points[probe], away[probe] / sdf[probe, None]):
-        count, size = count_crossings_of_all, max(1, _RAY_TESTS // len(surface.triangles))
-    for first in range(0, len(off_surface), size):
-        batch = off_surface[first : first + size]
-        crossings = count(surface, points[batch], away[batch] / sdf[batch, None])
-        sdf[batch[crossings % 2 == 1]] *= -1
-        yield 0.45 + 0.55 * (first + len(batch)) / len(off_surface)
+        off_surface = order[~on_surface[order]]
+        closed = is_closed(surface.triangles)
+        if not closed or getattr(surface.query, "every_ray", False):
+            asked, as_asked = off_surface, np.arange(len(off_surface))
+        else:
+            leader = yield from as_share(followers(points[off_surface], sdf[off_surface]), 0.45, 0.1)
+            leaders, as_asked = np.unique(leader, return_inverse=True)
+            asked = off_surface[leaders]
+        counting = crossing_counts(surface, points[asked], away[asked] / sdf[asked, None], closed)
+        crossings = yield from as_share(counting, 0.55, 0.45)
+        sdf[off_surface[crossings[as_asked] % 2 == 1]] *= -1
     return Fields(nearest, triangle, sdf, ncf)
 
 
-def _nearest_triangles(
-    surface: Surface, points: Floats, order: Ints, reach: Floats | None
-) -> Generator[float, None, Ints]:
-    """(N,) the triangle that is nearest to each point, up to float32; yields 0 to 0.35."""
-    triangle = np.empty(len(points), np.int64)
-    rounds = [order] if reach is not None else _coarse_to_fine(order)
-    looked_up = 0
-    for index, chosen in enumerate(rounds):
-        guides = _guide(order, index) if index else chosen
-        for first in range(0, len(chosen), _BATCH):
-            batch = chosen[first : first + _BATCH]
-            if reach is not None:
-                bounds = reach[batch]
-            elif index == 0:
-                bounds = np.full(len(batch), np.inf)
-            else:
-                guide = triangle[guides[first : first + _BATCH]]
-                bounds = np.linalg.norm(points[batch] - closest_on(surface, points[batch], guide)[0], axis=1)
-            triangle[batch] = surface.query.nearest(points[batch], bounds * (1 + BOUND_SLACK) + BOUND_MARGIN)
-            looked_up += len(batch)
-            yield 0.35 * looked_up / len(points)
-    return triangle
-
-
-def count_crossings(surface: Surface, origins: Floats, directions: Floats) -> Ints:
-    """(N,) how often the rays cross the surface; odd is inside (III-B).
-
-    A ray crosses a triangle once: when the tree finds the last triangle again, rounding held the ray
-    back, and it takes a longer step instead of counting.
-    """
-    count = np.zeros(len(origins), np.int64)
-    last = np.full(len(origins), -1)
-    step = np.full(len(origins), RAY_STEP)
-    travelled = np.zeros(len(origins))
-    rays = np.arange(len(origins))
-    while rays.size:
-        here = origins[rays] + travelled[rays, None] * directions[rays]
-        triangle, distance = surface.query.first_hit(here, directions[rays])
-        hit = triangle >= 0
-        rays, triangle, distance = rays[hit], triangle[hit], distance[hit]
-        again = triangle == last[rays]
-        count[rays] += ~again
-        step[rays] = np.where(again, 2 * step[rays], RAY_STEP)
-        last[rays] = triangle
-        travelled[rays] += distance + step[rays]
-    return count
-
-
-def count_crossings_of_all(surface: Surface, origins: Floats, directions: Floats) -> Ints:
-    """As count_crossings, by testing every ray against every triangle.
-
-    A line passes through a triangle when it runs around its three edges in one sense: the products of its Pluecker
-    coordinates with theirs have one sign. They sum up to direction . normal.
-    """
-    corners = [surface.vertices.take(surface.triangles[:, k], axis=0) for k in range(3)]
-    rays = np.concatenate([directions, cross(origins, directions)], axis=1)
-    turns = []
-    for a, b in zip(corners, corners[1:] + corners[:1], strict=True):
-        turns.append(rays @ np.concatenate([cross(a, b), b - a], axis=1).T)
-    one, two, three = turns
-    along_normal = one + two + three
-    normal = cross(corners[1] - corners[0], corners[2] - corners[0])
-    height = dot(corners[0], normal) - origins @ normal.T
-    inside = ((one >= 0) & (two >= 0) & (three >= 0)) | ((one <= 0) & (two <= 0) & (three <= 0))
-    return np.count_nonzero(inside & (height * along_normal > 0), axis=1)
-
-
-def _is_soup(surface: Surface, origins: Floats, directions: Floats) -> bool:
-    """Whether rays like these cross so many triangles that asking a tree for each crossing takes too long."""
-    rays, crossings = len(origins), 0
-    limit = max(_SOUP_CROSSINGS, _SOUP_SHARE * len(surface.triangles)) * rays
-    for first in range(0, rays, 8):  # in a soup already the first few tell, and each takes long
-        crossings += int(count_crossings(surface, origins[first : first + 8], directions[first : first + 8]).sum())
-        if crossings > limit:
-            return True
-    return False
-
-
-def _settled(surface: Surface, points: Floats, triangle: Ints) -> tuple[Ints, Floats, Floats]:
+def _settled(
+    surface: Surface, points: Floats, triangle: Ints, again: Callable[[Floats, Floats], Ints] | None
+) -> tuple[Ints, Floats, Floats]:
     """Triangle, p_n and its barycentric weights, given the nearest triangles as a tree found them.
 
     Where p_n lies on an edge or vertex, its triangle becomes the one there that faces p most. All of them
     are equally near, but across a UV seam their colors differ: which one a tree happens to find first, in
     the order of a file, must not decide. (The paper has no rule for ties.)
+
+    Where float32 cannot tell two of them apart and p_n differs, it does decide: what another tree found is asked again.
+
+    Args:
+        again: nearest triangles of points, given upper bounds of their distances, by the tree that decides.
     """
+    triangle = triangle.copy()
     nearest, weights = closest_on(surface, points, triangle)
+    if again is not None:
+        rows = _close_to_edges(surface, points, triangle, nearest, weights)
+        if rows.size:
+            triangle[rows] = again(points[rows], np.linalg.norm(points[rows] - nearest[rows], axis=1))
+            nearest[rows], weights[rows] = closest_on(surface, points[rows], triangle[rows])
     rows = np.flatnonzero((weights[:, 0] == 0) | (weights[:, 1] == 0) | (weights[:, 2] == 0))
     if not rows.size:
         return triangle, nearest, weights
@@ -187,7 +117,7 @@ def _settled(surface: Surface, points: Floats, triangle: Ints) -> tuple[Ints, Fl
     second = np.where(fewer, pivot, second)
     first, last = np.where(fewer, first_2, first), np.where(fewer, last_2, last)
 
-    triangle = triangle.copy()
+    differing = np.zeros(len(rows), bool)
     group = np.cumsum(last - first) // _CANDIDATES
     for here in np.split(np.arange(len(rows)), np.flatnonzero(np.diff(group)) + 1):
         row = np.repeat(here, last[here] - first[here])
@@ -209,7 +139,30 @@ def _settled(surface: Surface, points: Floats, triangle: Ints) -> tuple[Ints, Fl
         chosen = np.flatnonzero(is_best)[winner]
         at = rows[here]
         triangle[at], nearest[at], weights[at] = face[chosen], candidates[chosen], candidate_weights[chosen]
+        if again is not None:
+            gap = candidates - nearest[rows[row]]
+            differing[row[(dot(gap, gap) > ON_SURFACE**2) & (distance < least + TIE)]] = True
+    if again is not None and differing.any():
+        at = rows[differing]
+        first_found = again(points[at], np.linalg.norm(points[at] - nearest[at], axis=1))
+        triangle[at], nearest[at], weights[at] = _settled(surface, points[at], first_found, None)
     return triangle, nearest, weights
+
+
+def _close_to_edges(surface: Surface, points: Floats, triangle: Ints, nearest: Floats, weights: Floats) -> Ints:
+    """Rows whose p_n lies inside a triangle, but so close to an edge that the next one is as near in float32.
+
+    Moved along the surface by s, p_n is farther from p by s^2 / (2 |pp_n|).
+    """
+    least = weights.min(axis=1)
+    rows = np.flatnonzero((least > 0) & (least < 0.5))
+    away = points.take(rows, axis=0) - nearest.take(rows, axis=0)
+    reach = TIE + np.sqrt(2 * TIE * np.sqrt(dot(away, away)))
+    a, b, c = (surface.vertices.take(surface.triangles[triangle[rows], k], axis=0) for k in range(3))
+    area = cross(b - a, c - a)
+    longest = np.maximum(np.maximum(dot(b - a, b - a), dot(c - b, c - b)), dot(a - c, a - c))
+    height = np.sqrt(dot(area, area) / longest)  # the least of the three: at least as many rows as there must be
+    return rows[least[rows] * height < reach]
 
 
 def _faces_around(triangles: Ints, vertices: Ints) -> tuple[Ints, Ints, Ints]:
@@ -221,30 +174,3 @@ def _faces_around(triangles: Ints, vertices: Ints) -> tuple[Ints, Ints, Ints]:
     order = np.argsort(around, kind="stable")
     around = around[order]
     return face[order], np.searchsorted(around, vertices), np.searchsorted(around, vertices, side="right")
-
-
-def _coarse_to_fine(order: Ints) -> list[Ints]:
-    """The order in rounds: every 64th, the rest of every 8th, the rest."""
-    place = np.arange(len(order))
-    rounds = []
-    done = np.zeros(len(order), bool)
-    for stride in _STRIDES:
-        now = (place % stride == 0) & ~done
-        done |= now
-        rounds.append(order[now])
-    return rounds
-
-
-def _guide(order: Ints, index: int) -> Ints:
-    """For each point of a round, the point of the round before it that comes just before in the order."""
-    place = np.arange(len(order))
-    before, stride = _STRIDES[index - 1], _STRIDES[index]
-    now = (place % stride == 0) & (place % before != 0)
-    return order[place[now] // before * before]
-
-
-def closest_on(surface: Surface, points: Floats, triangle: Ints) -> tuple[Floats, Floats]:
-    """Closest points to (N, 3) points on (N,) triangles of a surface, and their barycentric weights, both (N, 3)."""
-    corners = surface.triangles.take(triangle, axis=0)
-    a, b, c = (surface.vertices.take(corners[:, k], axis=0) for k in range(3))
-    return closest_on_triangles(points, a, b, c)

@@ -314,6 +314,21 @@ def weld(positions: Floats, triangles: Ints) -> tuple[Floats, Ints]:
     return positions[first[by_place]], which[triangles]
 
 
+def is_closed(triangles: Ints) -> bool:
+    """Whether each edge of welded triangles has an even number of faces.
+
+    Edges are mixed to 64 bits each and put together by exclusive or, to which those in an even number add nothing:
+    it is 0 for an open mesh once in 2^64 times.
+    """
+    together = np.uint64(0)
+    width = np.uint64(int(triangles.max()) + 1)
+    for k in range(3):
+        first, second = (triangles[:, corner].astype(np.uint64) for corner in (k, (k + 1) % 3))
+        edges = np.minimum(first, second) * width + np.maximum(first, second)
+        together ^= np.bitwise_xor.reduce(_mix(edges))
+    return bool(together == 0)
+
+
 def triangle_areas(vertices: Floats, triangles: Ints) -> Floats:
     return np.linalg.norm(_area_vectors(vertices, triangles), axis=1) / 2
 

@@ -14,6 +14,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..blender.scene.fingerprint import fingerprint, in_edit_mode
+from ..blender.scene.node_queries import sweep
 from ..comparison.alignment import location_counts
 from . import session
 from .properties.items import item_target, kept
@@ -118,6 +119,7 @@ def _before_load(*_: object) -> None:
 
 @_kept
 def _after_load(*_: object) -> None:
+    sweep()  # what was saved on its own during a measurement
     session.clear()
     soon()
 

@@ -11,16 +11,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fmqm_addon.metric import fields
-from fmqm_addon.metric.fields import (
-    Fields,
-    _coarse_to_fine,
-    _guide,
-    count_crossings,
-    count_crossings_of_all,
-    evaluate_fields,
-)
+from fmqm_addon.metric import fields, queries
+from fmqm_addon.metric.fields import Fields, evaluate_fields
 from fmqm_addon.metric.geometry import Floats, Ints, morton_order
+from fmqm_addon.metric.queries import _coarse_to_fine, _guide, count_crossings, count_crossings_of_all
 from fmqm_addon.metric.surface import MeshArrays, Surface, prepare_surface
 from fmqm_addon.metric.texture import PlainColor
 
@@ -248,10 +242,10 @@ def test_only_a_soup_is_tested_without_a_tree(
         asked.append(1)
         return count_crossings_of_all(*arguments)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(fields, "count_crossings_of_all", counted)
+    monkeypatch.setattr(queries, "count_crossings_of_all", counted)
     found = fields_at(shape, points)
     assert bool(asked) == without_a_tree
-    monkeypatch.setattr(fields, "_SOUP_CROSSINGS", np.inf)
+    monkeypatch.setattr(queries, "_SOUP_CROSSINGS", np.inf)
     by_tree = fields_at(shape, points)
     assert np.array_equal(np.abs(found.sdf), np.abs(by_tree.sdf))
     assert np.count_nonzero(found.sdf != by_tree.sdf) <= 2

@@ -18,9 +18,13 @@ class BVHQuery:
     """Nearest triangles and ray hits of a triangle mesh; a metric.surface.SurfaceQuery.
 
     The tree works in float32, which the metric's frame (a box of diagonal 1 around the origin) fits.
+
+    Args:
+        every_ray: give each sample a ray of its own, as the plain way does that others are tested against.
     """
 
-    def __init__(self, vertices: Floats, triangles: Ints) -> None:
+    def __init__(self, vertices: Floats, triangles: Ints, every_ray: bool = True) -> None:
+        self.every_ray = every_ray
         self._tree = _build_tree(vertices, triangles)
 
     def nearest(self, points: Floats, bounds: Floats | None) -> Ints:

@@ -18,10 +18,10 @@ from ...metric.perceived import Perceived
 from ...metric.stepper import Progress, Stepper, Work, as_part
 from ..materials.images import TextureCache
 from ..materials.types import Reading
-from .bvh import BVHQuery
 from .fingerprint import fingerprint
 from .lods import are_kin
 from .mesh_arrays import AS_FOUND
+from .node_queries import surface_query
 from .target import Target, bakes, take
 
 _READING = 0.05  # share of the whole that reading the scene takes, about
@@ -140,7 +140,7 @@ def _work(
     shared = {"load": original.seconds}
     error, measurement = original.error, None
     if original.asset is not None:
-        measurement = measurement_of(original.asset, BVHQuery, options)
+        measurement = measurement_of(original.asset, surface_query, options)
         preparing = measurement.prepare()
         try:
             yield from as_part(preparing, _READING, share, f"Preparing {reference.label}")

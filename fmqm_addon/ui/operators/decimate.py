@@ -7,9 +7,9 @@ from typing import ClassVar
 
 import bpy
 
-from ...blender.scene.bvh import BVHQuery
 from ...blender.scene.decimate import decimated_copy, scene_reader
 from ...blender.scene.fingerprint import fingerprint
+from ...blender.scene.node_queries import surface_query
 from ...blender.scene.target import target_of
 from ...comparison.decimation import DecimationGoal, DecimationResult, SearchResult, Step, VersionReader, decimating
 from ...comparison.judge import Judge
@@ -114,7 +114,7 @@ def _why_not(context: bpy.types.Context) -> str:
 def _attempt(read: VersionReader, goal: DecimationGoal, settings: Settings) -> Work[DecimationResult | FMQMError]:
     """The search, or why it could not be done."""
     try:
-        return (yield from decimating(read, BVHQuery, goal, settings).steps())
+        return (yield from decimating(read, surface_query, goal, settings).steps())
     except FMQMError as error:
         return error
 

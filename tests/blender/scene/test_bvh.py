@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from fmqm_addon.blender.scene.bvh import BVHQuery
-from fmqm_addon.metric.fields import count_crossings
 from fmqm_addon.metric.geometry import closest_on_triangles
+from fmqm_addon.metric.queries import count_crossings
 from fmqm_addon.metric.surface import MeshArrays, prepare_surface
 from tests.blender import scenes
 
