@@ -12,6 +12,8 @@ from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
+import numpy as np
+
 from ..metric.errors import MeshError, SettingsError
 from ..metric.settings import FAST_SCORED_PATCHES, Settings
 from ..metric.stepper import Progress, Stepper, Work, as_part
@@ -24,6 +26,7 @@ LEAST_TRIANGLES = 4  # a tetrahedron
 
 T = TypeVar("T")
 
+_CLOSE = 4  # versions between those that quick scores pass and miss: they do not tell neighbors apart
 _PREPARED = 0.1  # share of the progress
 _PER_STEP = 0.1  # of the rest: how many steps there will be is not known
 
@@ -171,13 +174,27 @@ class Search:
 
         start, stride = len(versions) // 2, max(1, len(versions) // 4)
         if self._two_rounds:
-            guess = yield from last_passing(len(versions), lambda index: scored(index, True), start, stride)
-            start, stride = max(guess, 0), 1
+            guess = yield from last_passing(len(versions), lambda index: scored(index, True), start, stride, _CLOSE)
+            guess = max(guess, 0)
+            yield from scored(guess, False)
+            start, stride = self._corrected(versions, guess, target, judge), 1
         last = yield from last_passing(len(versions), lambda index: scored(index, False), start, stride)
         steps = [self._steps.get((False, version)) for version in versions[max(last, 0) : max(last, 0) + 2]]
         best, below = steps[0], steps[1] if last >= 0 and len(steps) > 1 else None
         assert best is not None
         return SearchResult(target, last >= 0, best, below, tuple(path))
+
+    def _corrected(self, versions: Sequence[Version], guess: int, target: float, judge: Judge) -> int:
+        """The last version that passes if all quick scores are as far off as that of the guess, which has both."""
+        quick, full = (self._steps[is_quick, versions[guess]].score(judge) for is_quick in (True, False))
+        if quick is None or full is None:
+            return guess
+        known = [(index, self._steps.get((True, version))) for index, version in enumerate(versions)]
+        places, scores = zip(
+            *((index, step.score(judge) or 0.0) for index, step in known if step is not None), strict=True
+        )
+        passing = np.flatnonzero(np.interp(np.arange(len(versions)), places, scores) + (full - quick) >= target)
+        return int(passing[-1]) if passing.size else 0
 
     def _scored(self, version: Version, quick: bool, number: int) -> Work[Step]:
         """Scores of earlier searches serve again."""
@@ -193,9 +210,9 @@ class Search:
         try:
             mesh = self._read[quick](version)
             triangles = len(mesh.triangles)
-            comparing = self._measurements[quick].compare(mesh)
-            compared = yield from as_part(comparing, done, (1 - done) * _PER_STEP, what)
-            fmqm, perceived = compared.scores.FMQM, compared.perceived.score
+            scoring = self._measurements[quick].score(mesh)
+            readings = yield from as_part(scoring, done, (1 - done) * _PER_STEP, what)
+            fmqm, perceived = readings.scores.FMQM, readings.perceived.score
         except MeshError:
             pass  # nothing is left of it: it misses any target
         step = Step(version, triangles, fmqm, perceived, quick)
@@ -204,14 +221,16 @@ class Search:
 
 
 def last_passing(
-    count: int, passes: Callable[[int], Generator[Progress, None, bool]], start: int, stride: int
+    count: int, passes: Callable[[int], Generator[Progress, None, bool]], start: int, stride: int, apart: int = 1
 ) -> Work[int]:
     """The last of `count` indices that passes, next to one that does not; -1 where index 0 does not pass.
+
+    With apart, one that passes where one that does not is at most so many further.
 
     Goes from start in strides that double until it has passed and failed once, then halves what is between.
     """
     passed, failed, index = -1, count, start
-    while failed - passed > 1:
+    while failed - passed > (apart if 0 <= passed and failed < count else 1):
         if (yield from passes(index)):
             passed = index
         else:

@@ -96,6 +96,10 @@ class Measurement:
         """
         return Stepper(self._compare(distorted, known))
 
+    def score(self, distorted: MeshArrays) -> Stepper[Readings]:
+        """A stepper over a comparison without its trust report."""
+        return Stepper(self._score(distorted))
+
     def reverse(self, distorted: MeshArrays) -> Stepper[Readings]:
         """A stepper over the other direction, the distorted mesh as the reference.
 
@@ -126,6 +130,10 @@ class Measurement:
             distorted=surface,
             trust=replace(trust, pair=(*known, *trust.pair, _error_fact(readings.stderr, len(results)))),
         )
+
+    def _score(self, distorted: MeshArrays) -> Work[Readings]:
+        _, results = yield from self._results(distorted, 0.0, 1.0)
+        return _means(results)
 
     def _reverse(self, distorted: MeshArrays) -> Work[Readings]:
         other = Measurement(distorted, self._build_query, self._settings, self._repeats)
