@@ -30,7 +30,6 @@ from .workers import PACKAGE, Limits
 
 PAIRS_A_TASK = 4  # of one reference: few enough to spread and to lose
 RETRIES = 2  # of a task that fails; one whose worker is lost goes to another by Dask's own rule
-WAIT = 30.0  # seconds for a first worker
 _CONNECT = 10.0  # seconds
 _ANSWER = 120.0  # seconds that a worker has to answer the probe: bpy comes over a network, perhaps
 _POLL = 0.1  # seconds between looks at what is done
@@ -45,7 +44,7 @@ def score_on_cluster(
     limits: Limits,
     journal: Journal,
     log: Log,
-    wait: float = WAIT,
+    wait: float = 30.0,
 ) -> None:
     """Scores all tasks into the journal, as they come.
 

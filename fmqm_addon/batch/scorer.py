@@ -20,8 +20,8 @@ from ..metric.errors import (
     one_line,
 )
 from ..report.explain import explain, where
-from ..report.html.pictures import picture_stem, texture_bytes, write_pair_pictures
 from ..report.records import Costs, PairScore, pair_record
+from ..report.texture_memory import texture_bytes
 from .interrupt import defer_interrupts
 from .journal import Journal
 from .progress_log import Log, print_stderr
@@ -185,6 +185,8 @@ class _Scorer:
         findings: dict[str, Any] = {}
         surfaces, result = (answer.reference, answer.comparison.distorted), answer.comparison.result
         if self._options.report:
+            from ..report.html.pictures import picture_stem, write_pair_pictures
+
             stem = picture_stem(row.reference, row.id, row.distorted)
             findings["pictures"] = write_pair_pictures(
                 self._options.report, stem, *surfaces, result, self._options.judge

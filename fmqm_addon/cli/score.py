@@ -13,10 +13,9 @@ import argparse
 import functools
 import os
 import tempfile
-from collections.abc import Sequence
-from typing import TextIO
+from collections.abc import Mapping, Sequence
+from typing import Any, TextIO
 
-from ..batch.cluster import WAIT, score_on_cluster
 from ..batch.interrupt import defer_interrupts
 from ..batch.journal import Journal, Records, row_key
 from ..batch.manifest import glob_files, lod_rows, plain_rows, read_manifest
@@ -25,11 +24,11 @@ from ..batch.progress_log import Log, print_stderr
 from ..batch.rows import BatchOptions, Row, Task
 from ..batch.scorer import score_shard, score_tasks, units_of
 from ..batch.workers import WORKER, Limits, recover_scores, score_with_workers, workers_command
+from ..comparison.judge import Judge
 from ..folders import TEMPORARY, own_folder, sweep
 from ..metric.errors import FileError, FMQMError, SettingsError
 from ..provenance import provenance
 from ..report.atomic_files import STDOUT, check_apart, check_writable
-from ..report.html.pictures import has_pictures, open_report_folder
 from .process import (
     FAILED,
     OK,
@@ -39,6 +38,7 @@ from .process import (
     run_script,
 )
 from .score_arguments import (
+    WAIT,
     build_parser,
     check_arguments,
     criteria_of,
@@ -83,6 +83,8 @@ def main(argv: Sequence[str], out: TextIO, program: str = PROGRAM) -> int:
             if path and path != STDOUT:
                 check_writable(path)
         if args.report:
+            from ..report.html.pictures import open_report_folder
+
             open_report_folder(args.report)
         if args.merge:
             return _merge(args, rows, out)
@@ -139,7 +141,8 @@ def _score(
     waiting = {
         key: Task(key, row)
         for key, row in zip(keys, rows, strict=True)
-        if not journal.has_scores(key) or not has_pictures(args.report, journal.record(key), options.judge)
+        if not journal.has_scores(key)
+        or (args.report and not _has_pictures(args.report, journal.record(key), options.judge))
     }
     tasks = list(waiting.values())
     # A pair that ends its process, as some files do, shall be an error of its own.
@@ -148,8 +151,11 @@ def _score(
     last = None
     try:
         if args.dask:
+            from ..batch.cluster import score_on_cluster
+
             log = Log(args.program, len(tasks), len(tasks), args.quiet)
-            score_on_cluster(tasks, args.dask, _WORKER_SCRIPT, argv, limits, journal, log, args.wait_workers or WAIT)
+            wait = args.wait_workers or WAIT
+            score_on_cluster(tasks, args.dask, _WORKER_SCRIPT, argv, limits, journal, log, wait)
         elif use_workers:
             with own_folder(folder, kind) as place:
                 log = Log(args.program, len(tasks), len(tasks), args.quiet)
@@ -170,6 +176,12 @@ def _score(
     batch = args.manifest or args.glob or args.lods or args.jobs or args.dask or args.journal or args.resume
     journal.close() if batch else journal.remove()
     return code
+
+
+def _has_pictures(folder: str, record: Mapping[str, Any], judge: Judge) -> bool:
+    from ..report.html.pictures import has_pictures
+
+    return has_pictures(folder, record, judge)
 
 
 def _merge(args: argparse.Namespace, rows: list[Row] | None, out: TextIO) -> int:

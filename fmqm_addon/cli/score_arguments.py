@@ -8,7 +8,6 @@ import hashlib
 import os
 from dataclasses import fields
 
-from ..batch.cluster import WAIT
 from ..batch.rows import BatchOptions
 from ..batch.workers import Limits
 from ..blender.access import Access
@@ -20,10 +19,10 @@ from ..metric.errors import SettingsError
 from ..metric.settings import PRESETS, SETTING_NAMES, Settings
 from ..report.atomic_files import STDOUT
 from ..report.criteria import Criteria
-from ..report.html.page import PAGE
 from .arguments import OneLineParser, add_access, add_judge, add_option, check_access, flag_of, settings_of
 
 PAIR_NAMES = tuple(each.name for each in fields(PairOptions) if each.name != "settings")
+WAIT = 30.0  # seconds for a first worker of a cluster
 _LONGEST_NAME = 255  # bytes, where file systems are common
 
 
@@ -259,7 +258,11 @@ def output_files(args: argparse.Namespace) -> dict[str, str | None]:
 
 
 def page_file(args: argparse.Namespace) -> dict[str, str | None]:
-    return {"--report": args.report and os.path.join(args.report, PAGE)}
+    if not args.report:
+        return {"--report": None}
+    from ..report.html.page import PAGE
+
+    return {"--report": os.path.join(args.report, PAGE)}
 
 
 def journal_path(args: argparse.Namespace) -> str | None:

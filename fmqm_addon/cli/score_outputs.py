@@ -13,8 +13,6 @@ from ..comparison.judge import Judge
 from ..report.atomic_files import STDOUT, check_apart, print_parts, write_parts
 from ..report.criteria import below, shortfall
 from ..report.explain import explain, footnote
-from ..report.html.page import write_page
-from ..report.junit import junit_parts
 from ..report.parts_table import parts_parts
 from ..report.records import csv_parts, json_parts, note_parts, table_parts, trust_parts
 from .process import FAILED, OK
@@ -38,14 +36,19 @@ def write_outputs(
     texts = [
         (args.json, json_parts(records, settings, head)),
         (args.csv, csv_parts(records, args.csv_raw)),
-        (args.junit, junit_parts(records)),
     ]
+    if args.junit:
+        from ..report.junit import junit_parts
+
+        texts.append((args.junit, junit_parts(records)))
     try:
         check_apart(output_files(args) | page_file(args), _images(records))
         for path, parts in texts:
             if path and path != STDOUT:
                 write_parts(path, parts)
         if args.report:
+            from ..report.html.page import write_page
+
             write_page(args.report, records, settings, versions)
         if last is not None:
             _write_last(args, last)
@@ -55,13 +58,14 @@ def write_outputs(
 
 
 def _write_last(args: argparse.Namespace, last: PairResult) -> None:
-    from ..report.npz import save_fields
-    from ..report.sheet import write_picture
-
     result = last.comparison.result
     if args.save_fields:
+        from ..report.npz import save_fields
+
         save_fields(args.save_fields, result)
     if args.picture:
+        from ..report.sheet import write_picture
+
         write_picture(args.picture, last.reference, last.comparison.distorted, result, judge=args.judge or Judge.FMQM)
 
 

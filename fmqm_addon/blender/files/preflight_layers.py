@@ -6,9 +6,9 @@ Opening a stage composes all of its prims at once, and nothing stops it: nine la
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
-import zipfile
 from typing import Any
 
 import numpy as np
@@ -47,14 +47,18 @@ def check_text(path: str) -> None:
         if is_text:
             with open(path, "rb") as file:
                 _check_brackets(path, file.read())
-        elif zipfile.is_zipfile(path):
+        else:
             _check_archive(path)
-    except (OSError, zipfile.BadZipFile, NotImplementedError, RuntimeError):
+    except (OSError, NotImplementedError, RuntimeError):
         return  # the importer says what is wrong
 
 
 def _check_archive(path: str) -> None:
-    with zipfile.ZipFile(path) as archive:
+    import zipfile  # only here: it takes a while to import
+
+    if not zipfile.is_zipfile(path):
+        return
+    with contextlib.suppress(zipfile.BadZipFile), zipfile.ZipFile(path) as archive:
         for info in archive.infolist():
             # USD reads only what is stored as it is.
             if info.filename.lower().endswith((".usd", ".usda")) and info.compress_type == zipfile.ZIP_STORED:

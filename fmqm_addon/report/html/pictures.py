@@ -16,7 +16,6 @@ from ...comparison.judge import Judge
 from ...metric.errors import FileError, OutputError
 from ...metric.evaluation import Result
 from ...metric.surface import Surface
-from ...metric.texture import image_arrays
 from ..atomic_files import check_writable, replaced
 from ..render import (
     Camera,
@@ -28,6 +27,7 @@ from ..render import (
     score_by_face,
     three_views,
 )
+from ..texture_memory import texture_bytes
 from ..visual.worst import patch_view, worst_patches
 
 PICTURES = "pictures"  # the folder beside the page
@@ -36,7 +36,6 @@ CLOSE_UP = 288  # pixels; width and height of a close-up
 CLOSE_UPS = 3  # worst patches that are shown
 CLOSE_UP_MARGIN = 1.2  # a close-up is so many patch diagonals wide
 JPEG_QUALITY = 92  # with full color resolution: what is shown may be the artifacts of a texture
-BYTES_PER_PIXEL = 4  # of a texture in a graphics card's memory, uncompressed: RGBA
 
 
 def open_report_folder(folder: str) -> None:
@@ -139,16 +138,6 @@ def _close_ups(
             }
         )
     return found
-
-
-def texture_bytes(surface: Surface) -> int:
-    """Memory of the images that the surface's colors are read from, as RGBA bytes; an image that is shared once."""
-    images = {
-        id(pixels): pixels.shape[0] * pixels.shape[1] * BYTES_PER_PIXEL
-        for material in surface.materials
-        for pixels in image_arrays(material)
-    }
-    return sum(images.values())
 
 
 def _write(folder: str, stem: str, view: Pixels) -> str:
