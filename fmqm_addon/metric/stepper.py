@@ -26,12 +26,14 @@ class Stepper(Generic[T]):
     """Work in steps of some milliseconds: for a loop, a progress bar or a timer alike.
 
     Attributes:
-        progress: where the work is. seconds: time spent, by stage. result: there once step() is False.
+        progress: where the work is. result: there once step() is False.
+        seconds: by stage, from the first step on, with what has passed between the steps: as long as someone waits.
     """
 
     def __init__(self, work: Work[T]) -> None:
         self._work = work
         self._done = False
+        self._last: float | None = None  # when the last step ended
         self.progress = Progress("", 0.0)
         self.seconds: dict[str, float] = {}
         self.result: T
@@ -40,7 +42,7 @@ class Stepper(Generic[T]):
         """Do a little; True while there is more to do."""
         if self._done:
             return False
-        began = time.perf_counter()
+        began = time.perf_counter() if self._last is None else self._last
         more = True
         try:
             self.progress = next(self._work)
@@ -48,7 +50,8 @@ class Stepper(Generic[T]):
             self.result = end.value
             self._done, more = True, False
         stage = self.progress.stage
-        self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - began
+        self._last = time.perf_counter()
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + self._last - began
         return more
 
     def run(self) -> T:

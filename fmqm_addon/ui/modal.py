@@ -15,6 +15,7 @@ from . import session, stale
 SLICE = 0.035  # seconds of work per tick of the timer: the window stays smooth
 SHOWN_EVERY = 0.2  # seconds between redraws of the progress
 TICK = 0.005  # seconds between ticks, for Blender to draw and listen
+REST = 4  # times what a redraw has cost until the next: at most a quarter of the time goes into drawing
 
 
 class SteppedOperator:
@@ -33,6 +34,7 @@ class SteppedOperator:
     report: Callable[[set[str], str], None]  # the operator's
     _job: session.Job
     _shown: float = 0.0
+    _drawn: float | None = 0.0  # seconds that the last redraw took; None: it is awaited
 
     def begin(self, context: bpy.types.Context) -> bool:
         raise NotImplementedError
@@ -82,6 +84,8 @@ class SteppedOperator:
             return {"CANCELLED"}
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
+        if self._drawn is None:
+            self._drawn = max(0.0, time.perf_counter() - self._shown - TICK)
         try:
             more = self._slice()
         except BaseException:
@@ -124,8 +128,9 @@ class SteppedOperator:
         progress = self.stepper.progress
         job.progress = progress.done
         now = time.perf_counter()
-        if progress.stage == job.text and now - self._shown < SHOWN_EVERY:
+        least = SHOWN_EVERY if progress.stage == job.text else 0.0
+        if now - self._shown < max(least, REST * (self._drawn or 0.0)):
             return
-        self._shown, job.text = now, progress.stage
+        self._shown, self._drawn, job.text = now, None, progress.stage
         context.workspace.status_text_set(f"FMQM: {job.text}, {100 * job.progress:.0f} %        Esc: Cancel")
         stale.redraw()
