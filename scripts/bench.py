@@ -3,7 +3,8 @@
 
     python scripts/bench.py [--growth] [--case REFERENCE DISTORTED] [--decimated REFERENCE] [--batch] ...
 
-Without cases it measures generated surfaces. Each pair is scored in a process of its own, as a user would.
+Without cases it measures generated surfaces. Each pair is scored in a process of its own, as a user would; "whole" is
+that process from its start to its end, in floors, and "1 core" how many times as long its fields take on one core.
 The floor is the time of plain Python loops of nearest-point and ray-parity queries on both surfaces, along
 the same curve, with the tightest bounds there can be: nothing that asks the trees less can be faster.
 """
@@ -20,7 +21,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -48,14 +49,25 @@ def main() -> int:
     parser.add_argument(
         "--samples", action="store_true", help="a generated surface at 50, 100 and 200 thousand samples"
     )
+    parser.add_argument(
+        "--decimate",
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="processor time of decimate.py --target-fmqm 0.9",
+    )
     parser.add_argument("--batch", action="store_true", help="40 pairs with 1 and 2 jobs, and the parent's memory")
     parser.add_argument("--part", nargs="+", help=argparse.SUPPRESS)  # one of PARTS, in a process of its own
     args = parser.parse_args()
     if args.part:
         PARTS[args.part[0]](*args.part[1:])
         return 0
-    everything = not (args.case or args.decimated or args.growth or args.samples or args.batch)
-    print(f"{'pair':34}{'triangles':>10}" + "".join(f"{stage:>9}" for stage in STAGES) + "    floor  ratio    peak")
+    everything = not (args.case or args.decimated or args.growth or args.samples or args.batch or args.decimate)
+    print(
+        f"{'pair':34}{'triangles':>10}"
+        + "".join(f"{stage:>9}" for stage in STAGES)
+        + "    floor  ratio  whole 1 core    peak"
+    )
     with tempfile.TemporaryDirectory() as folder:
         small = str(Path(folder) / "small.blend")
         small_lod = str(Path(folder) / "small_lod.blend")
@@ -74,6 +86,8 @@ def main() -> int:
             part("decimate", small, small_lod)
             for samples in (50_000, 100_000, 200_000):
                 measure(f"generated, {samples:,} samples", small, small_lod, samples)
+        for path in args.decimate:
+            measure_decimation(path)
         if args.batch or everything:
             part("generate", str(GENERATED[0]), small)
             part("decimate", small, small_lod)
@@ -88,24 +102,48 @@ def part(name: str, *args: str) -> str:
 
 
 def measure(name: str, reference: str, distorted: str, samples: int = 200_000) -> None:
-    """Scores a pair in a process of its own and prints a row: seconds by stage, floor, ratio, peak memory."""
+    """Scores a pair in processes of their own and prints a row: seconds by stage, floor, ratios, peak memory."""
     flags = ["--quiet", "--samples", str(samples), "--json", "-"]
     command = [sys.executable, str(ROOT / "scripts" / "score.py"), reference, distorted, *flags]
-    with tempfile.TemporaryFile() as out:
-        process = subprocess.Popen(command, stdout=out, stderr=subprocess.DEVNULL)
-        _, status, usage = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
-        out.seek(0)
-        pair = json.load(out)["pairs"][0]
+    pair, whole, peak = run_score(command)
     if pair["error"]:
         print(f"{name:34}{pair['error']}")
         return
     floor, triangles = map(float, part("floor", reference, distorted, str(samples)).split())
     seconds = pair["seconds"]
+    alone = float("nan")
+    if hasattr(os, "sched_setaffinity"):
+        cores = os.sched_getaffinity(0)
+        os.sched_setaffinity(0, {min(cores)})
+        try:
+            alone = run_score(command)[0]["seconds"]["fields"] / seconds["fields"]
+        finally:
+            os.sched_setaffinity(0, cores)
     numbers = "".join(f"{seconds[stage]:9.2f}" for stage in STAGES)
-    peak = usage.ru_maxrss / 2**20  # kilobytes on Linux
-    ratio = seconds["total"] / floor
-    print(f"{name:34}{triangles:10.0f}{numbers}{floor:9.2f}{ratio:7.2f}{peak:6.2f} GB", flush=True)
+    ratios = f"{seconds['total'] / floor:7.2f}{whole / floor:7.2f}{alone:7.2f}"
+    print(f"{name:34}{triangles:10.0f}{numbers}{floor:9.2f}{ratios}{peak:6.2f} GB", flush=True)
+
+
+def run_score(command: list[str]) -> tuple[dict[str, Any], float, float]:
+    """The record of the only pair, seconds from start to end, and the peak memory in GB."""
+    with tempfile.TemporaryFile() as out:
+        began = time.perf_counter()
+        process = subprocess.Popen(command, stdout=out, stderr=subprocess.DEVNULL)
+        _, status, usage = os.wait4(process.pid, 0)
+        whole = time.perf_counter() - began
+        process.returncode = os.waitstatus_to_exitcode(status)
+        out.seek(0)
+        return json.load(out)["pairs"][0], whole, usage.ru_maxrss / 2**20  # kilobytes on Linux
+
+
+def measure_decimation(path: str) -> None:
+    """Prints the processor time of a whole search for the fewest triangles."""
+    command = [sys.executable, str(ROOT / "scripts" / "decimate.py"), path, "--target-fmqm", "0.9", "--quiet"]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    seconds, code = usage.ru_utime + usage.ru_stime, process.returncode
+    print(f"{Path(path).name} decimated to 0.9: {seconds:.1f} s of processors, exit code {code}", flush=True)
 
 
 def measure_batches(reference: str, distorted: str) -> None:
