@@ -52,34 +52,40 @@ def evaluate_fields(
     The tree says which triangle is nearest and what a ray hits; where on the triangle, and how far, is
     computed here in float64.
     """
+    points = points.take(order, axis=0)  # in this order all below looks at rows that lie together
     with opened(surface.query):
-        triangle = yield from as_share(nearest_triangles(surface, points, order, reach), 0.0, 0.35)
+        finding = nearest_triangles(surface, points, None if reach is None else reach.take(order))
+        triangle = yield from as_share(finding, 0.0, 0.35)
         again = surface.query.one_by_one if isinstance(surface.query, BatchQuery) else None
         nearest = np.empty_like(points)
         ncf = np.empty(points.shape, np.float32)
         for first in range(0, len(order), _SURFACE_BATCH):
-            batch = order[first : first + _SURFACE_BATCH]
+            batch = slice(first, first + _SURFACE_BATCH)
             triangle[batch], nearest[batch], weights = _settled(surface, points[batch], triangle[batch], again)
             ncf[batch] = surface.color_at(triangle[batch], weights)
-            yield 0.35 + 0.1 * (first + len(batch)) / len(order)
+            yield 0.35 + 0.1 * min(1.0, (first + _SURFACE_BATCH) / len(order))
         away = points - nearest
         sdf = np.sqrt(dot(away, away))
         on_surface = sdf <= ON_SURFACE
         nearest[on_surface] = points[on_surface]
         sdf[on_surface] = 0.0
 
-        off_surface = order[~on_surface[order]]
+        off_surface = np.flatnonzero(~on_surface)
         closed = is_closed(surface.triangles)
         if not closed or getattr(surface.query, "every_ray", False):
             asked, as_asked = off_surface, np.arange(len(off_surface))
         else:
-            leader = yield from as_share(followers(points[off_surface], sdf[off_surface]), 0.45, 0.1)
-            leaders, as_asked = np.unique(leader, return_inverse=True)
-            asked = off_surface[leaders]
-        counting = crossing_counts(surface, points[asked], away[asked] / sdf[asked, None], closed)
+            following = followers(points.take(off_surface, axis=0), sdf.take(off_surface))
+            leader = yield from as_share(following, 0.45, 0.1)
+            leads = leader == np.arange(len(leader))
+            asked, as_asked = off_surface[leads], (np.cumsum(leads) - 1).take(leader)
+        directions = away.take(asked, axis=0) / sdf.take(asked)[:, None]
+        counting = crossing_counts(surface, points.take(asked, axis=0), directions, closed)
         crossings = yield from as_share(counting, 0.55, 0.45)
-        sdf[off_surface[crossings[as_asked] % 2 == 1]] *= -1
-    return Fields(nearest, triangle, sdf, ncf)
+        sdf[off_surface[(crossings % 2 == 1).take(as_asked)]] *= -1
+    back = np.empty_like(order)
+    back[order] = np.arange(len(order))
+    return Fields(nearest.take(back, axis=0), triangle.take(back), sdf.take(back), ncf.take(back, axis=0))
 
 
 def _settled(

@@ -70,31 +70,27 @@ def batch_size(query: SurfaceQuery) -> int:
     return query.batch if isinstance(query, BatchQuery) else _BATCH
 
 
-def nearest_triangles(
-    surface: Surface, points: Floats, order: Ints, reach: Floats | None
-) -> Generator[float, None, Ints]:
+def nearest_triangles(surface: Surface, points: Floats, reach: Floats | None) -> Generator[float, None, Ints]:
     """(N,) the triangle that is nearest to each point, up to float32; yields the share done.
 
     Args:
-        order, reach: as in fields.evaluate_fields.
+        points: in an order in which neighbours are near in space.
+        reach: (N,) upper bounds of the distances, where known.
     """
     triangle = np.empty(len(points), np.int64)
     query, size = surface.query, batch_size(surface.query)
-    if isinstance(query, BatchQuery):  # asked at once, no answer bounds another
-        for first in range(0, len(order), size):
-            batch = order[first : first + size]
-            triangle[batch] = query.nearest(points[batch], None if reach is None else loosened(reach[batch]))
-            yield (first + len(batch)) / len(order)
+    if reach is not None or isinstance(query, BatchQuery):  # which asks at once: no answer bounds another
+        for first in range(0, len(points), size):
+            here = slice(first, first + size)
+            triangle[here] = query.nearest(points[here], None if reach is None else loosened(reach[here]))
+            yield min(1.0, (first + size) / len(points))
         return triangle
-    rounds = [order] if reach is not None else _coarse_to_fine(order)
-    looked_up = 0
-    for index, chosen in enumerate(rounds):
+    order, looked_up = np.arange(len(points)), 0
+    for index, chosen in enumerate(_coarse_to_fine(order)):
         guides = _guide(order, index) if index else chosen
         for first in range(0, len(chosen), size):
             batch = chosen[first : first + size]
-            if reach is not None:
-                bounds = reach[batch]
-            elif index == 0:
+            if index == 0:
                 bounds = np.full(len(batch), np.inf)
             else:
                 guide = triangle[guides[first : first + size]]
@@ -151,14 +147,14 @@ def careful_counts(surface: Surface, origins: Floats, directions: Floats) -> Gen
     are counted in directions that differ a little. A few that meet folds in all of them are tested against every
     triangle; many, as where sheets coincide, keep their first count.
     """
-    count, folded = yield from as_share(_counting(surface, origins, directions, True), 0.0, 0.9)
+    count, folded = yield from as_share(_counting(surface, origins, directions, True), 0.0, 1.0)
     doubtful = np.flatnonzero(folded)
     for axis in _TILTS:
         if not doubtful.size:
             return count
         tilted = directions[doubtful] + cross(directions[doubtful], np.tile(axis, (len(doubtful), 1)))
         tilted /= np.linalg.norm(tilted, axis=1, keepdims=True)
-        found, folded = yield from as_share(_counting(surface, origins[doubtful], tilted, True), 0.9, 0.0)
+        found, folded = yield from as_share(_counting(surface, origins[doubtful], tilted, True), 1.0, 0.0)
         count[doubtful[~folded]] = found[~folded]
         doubtful = doubtful[folded]
     if len(doubtful) * len(surface.triangles) <= _RAY_TESTS:

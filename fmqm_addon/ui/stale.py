@@ -107,6 +107,7 @@ def _on_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 
 @_kept
 def _on_undo(*_: object) -> None:
+    sweep()  # the step may be one of during a measurement
     forget_removed()
     soon()
     bpy.app.timers.register(settle_colors, first_interval=0)

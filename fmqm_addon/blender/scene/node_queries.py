@@ -26,7 +26,7 @@ from .bvh import BVHQuery
 
 NAME = ".FMQM queries"  # of all that is made here; menus leave out what begins with a dot
 SETTING = "FMQM_QUERIES"  # environment variable: "python" keeps the plain loop
-BATCH = 8192  # questions of a step: some milliseconds, where an evaluation alone takes a third of one
+BATCH = 16384  # questions of a step: some milliseconds, where an evaluation alone takes a third of one
 WORTH_IT = 256  # fewer questions are answered sooner by a tree that is there
 # Beyond, bounds save the plain loop as much as two cores do, and a second tree, to ask again, would take its time and
 # memory. Nodes interpolate a triangle's number in float32, which up to here is exact enough, too.

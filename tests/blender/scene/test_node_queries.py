@@ -135,7 +135,7 @@ def test_nothing_stays_after_cancelling_or_an_error(monkeypatch: pytest.MonkeyPa
 def test_nothing_is_in_a_file_that_is_saved_meanwhile(tmp_path: Path) -> None:
     """And the measurement goes on, after another file was opened, too."""
     wanted = finish(begun(soup_surface(NodeQuery), 1))
-    work = begun(soup_surface(NodeQuery), 2)
+    work = begun(soup_surface(NodeQuery), 1)
     path = str(tmp_path / "saved.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
     with bpy.data.libraries.load(path) as (inside, _):
