@@ -28,8 +28,9 @@ from fmqm_addon.report.criteria import ANYTHING, Criteria
 from fmqm_addon.report.html import pictures as pair_pictures
 from fmqm_addon.report.html.chain_curve import Level, curve_svg
 from fmqm_addon.report.html.page import page_parts, write_page
-from fmqm_addon.report.html.pictures import open_report_folder, picture_stem, texture_bytes, write_pair_pictures
+from fmqm_addon.report.html.pictures import open_report_folder, picture_stem, write_pair_pictures
 from fmqm_addon.report.render import Camera, is_seen, render
+from fmqm_addon.report.texture_memory import texture_bytes
 from tests.blender.script import COLUMNS, SMALL, noise, score, write_png, write_torus
 from tests.readings import numbers
 
