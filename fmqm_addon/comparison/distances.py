@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..metric.fields import closest_on
+from ..metric.queries import closest_on
 from ..metric.geometry import Floats, Ints, dot, morton_order
 from ..metric.sampling import draw_barycentric, triangles_evenly
 from ..metric.surface import Surface, triangle_areas

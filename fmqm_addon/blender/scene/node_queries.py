@@ -149,9 +149,7 @@ class _Stage:
         self._scene = bpy.data.scenes.new(NAME)
         self._layer = self._scene.view_layers[0]
         mesh = bpy.data.meshes.new(NAME)
-        mesh.vertices.add(len(vertices))
-        arrays.write(mesh.attributes["position"].data, "vector", vertices.astype(np.float32))
-        arrays.add_triangles(mesh, triangles.astype(np.int32))
+        arrays.fill(mesh, vertices, triangles)
         # On corners, where nodes look for it: from elsewhere all of it would be copied for each evaluation.
         # From 1: what finds nothing answers 0.
         number = mesh.attributes.new("number", "FLOAT", "CORNER")
