@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..metric.queries import closest_on
 from ..metric.geometry import Floats, Ints, dot, morton_order
+from ..metric.queries import closest_on
 from ..metric.sampling import draw_barycentric, triangles_evenly
 from ..metric.surface import Surface, triangle_areas
 from .surface_facts import Work
