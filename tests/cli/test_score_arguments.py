@@ -35,7 +35,7 @@ def test_each_flag_reaches_the_pair() -> None:
     values |= {"normal_threshold": 0.9, "tangent_threshold": 0.1, "color_units": 9, "centers": "random"}
     values |= {"color_space": "lab", "pooling": "arithmetic", "seed": 3}
     assert set(values) == set(SETTING_NAMES)
-    pair = {"repeats": 2, "space": "local", "match_scale": True, "both": True, "attribution": True}
+    pair = {"repeats": 2, "space": "local", "match_scale": True, "both": True, "attribution": True, "align": "icp"}
     assert set(pair) == set(PAIR_NAMES)
     flags = [
         part

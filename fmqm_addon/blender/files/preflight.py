@@ -129,6 +129,8 @@ def check_ply(path: str) -> tuple[str, ...]:
     with open(path, "rb") as file:
         data = file.read()
     header, _, _ = data.partition(b"end_header")
+    if data.startswith(b"ply") and b"\nproperty" in header.partition(b"\nelement")[0]:  # crashes Blender 4.5 at times
+        raise FileError(f"{path}: the PLY header lists properties of no element; export the file again")
     for line in header.splitlines():
         words = line.split()
         if words[:1] == [b"element"] and not (len(words) == 3 and _COUNT.fullmatch(words[2])):

@@ -85,7 +85,7 @@ def test_without_a_clip_as_the_nodes_stand(tmp_path: Path, kind: str) -> None:
     assert one.pose == other.pose == Pose() and str(one.pose) == "rest"
     assert abs(height(one) - TOP) < 1e-3
     np.testing.assert_allclose(one.world().positions, other.world().positions, atol=1e-4)
-    assert not one.mesh.notes
+    assert one.mesh.notes == other.mesh.notes == ("Post: there is no material; Blender's default grey is taken",)
 
 
 @pytest.mark.parametrize("kind", ["glb", "fbx"])

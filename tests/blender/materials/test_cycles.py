@@ -230,11 +230,6 @@ def luminance_as_alpha(scene: Scene) -> Sockets:
 
 
 @construction
-def alpha_as_color(scene: Scene) -> Sockets:
-    return scene.image(noise(4)).outputs["Alpha"], None
-
-
-@construction
 def generated_image(scene: Scene) -> Sockets:
     image = bpy.data.images.new("generated", 64, 64)
     image.generated_type = "COLOR_GRID"
@@ -687,6 +682,12 @@ def test_two_nodes_of_an_image(scene: Scene, name: str) -> None:
     check_baked(scene.surface(), wanted, "read" if name in apart else "baked")
 
 
+def test_alpha_as_color_is_baked(scene: Scene) -> None:
+    alpha = scene.image(noise(4)).outputs["Alpha"]
+    scene.link(alpha, scene.shader().inputs["Base Color"])
+    check_baked(scene.surface(), encode_srgb(bake(scene, alpha, None)))
+
+
 def in_mix_shader(scene: Scene, alpha: bpy.types.NodeSocket, factor: float) -> None:
     mix, other, output = scene.node("MixShader"), scene.node("BsdfGlossy"), scene.tree.get_output_node("ALL")
     mix.inputs[0].default_value = factor
@@ -1117,4 +1118,6 @@ def test_obj(scene: Scene, opacity: str) -> None:
     (scene.folder / "square.obj").write_text(OBJ, encoding="utf-8")
     (scene.folder / "square.mtl").write_text(f"{MTL}{opacity}\n", encoding="utf-8")
     imported(scene, "square.obj")
-    check(scene)
+    shader = scene.shader()
+    color, alpha = source(shader.inputs["Base Color"]), source(shader.inputs["Alpha"])
+    check_baked(scene.surface(), encode_srgb(bake(scene, color, alpha)))

@@ -334,7 +334,7 @@ def test_script_decimates_to_a_target_and_says_how(torus: Path, tmp_path: Path, 
     assert done.stdout.count("found") == 2 and f"{geometry['best']['FMQM']:.4f}" in done.stdout
     again = score(torus, out, "--samples", 6400, "--patches", 50, "--json", "-", "--quiet")
     assert strict_json(again.stdout)["pairs"][0]["FMQM"] == pytest.approx(texture["best"]["FMQM"], abs=1e-9)
-    assert not again.stderr
+    assert not [line for line in again.stderr.splitlines() if "its colors differ" not in line]  # a quarter of the side
 
 
 def test_script_makes_a_chain(torus: Path, tmp_path: Path) -> None:

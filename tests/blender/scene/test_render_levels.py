@@ -40,7 +40,8 @@ def test_levels_of_renders_count(
     blocks = [len(bpy.data.objects), len(bpy.data.meshes), len(bpy.data.scenes)]
     found, notes = measured(object_)
     assert found == triangles
-    assert bool(notes) == (levels != render_levels) and all("Smooth" in note for note in notes)
+    told = [note for note in notes if "no material" not in note]
+    assert bool(told) == (levels != render_levels) and all("Smooth" in note for note in told)
     modifier = object_.modifiers[0]
     assert (modifier.levels, modifier.render_levels) == (levels, render_levels)
     assert [len(bpy.data.objects), len(bpy.data.meshes), len(bpy.data.scenes)] == blocks
@@ -92,11 +93,11 @@ def test_the_resolution_of_renders_counts(kind: str) -> None:
     object_ = bpy.context.object
     blocks = [len(bpy.data.curves), len(bpy.data.metaballs)]
     fine, notes = measured(object_)
-    assert "its resolution" in notes[0]
+    assert any("its resolution" in note for note in notes)
     if kind == "curve":
         data.render_resolution_u = 0  # the viewport's
     else:
         data.render_resolution = data.resolution
     coarse, notes = measured(object_)
-    assert fine > 3 * coarse and not notes
+    assert fine > 3 * coarse and not [note for note in notes if "its resolution" in note]
     assert [len(bpy.data.curves), len(bpy.data.metaballs)] == blocks
