@@ -13,8 +13,9 @@ import numpy as np
 from ...blender.materials.types import Reading
 from ...blender.scene.lods import are_kin
 from ...blender.scene.measure import Outcome, measuring
-from ...blender.scene.target import target_of
+from ...blender.scene.target import Target, target_of
 from ...metric.errors import FMQMError
+from ...metric.geometry import Floats
 from ...report.trust_table import trust_dict
 from .. import session, stale, stored_text
 from ..modal import SteppedOperator
@@ -22,7 +23,7 @@ from ..properties.items import item_target
 from ..properties.rows import row_targets
 from ..properties.scene import FMQMScene
 from ..properties.settings import pair_options, patterns_of
-from ..view.shown import forget_removed
+from ..view.shown import forget_removed, show_heat_map
 from .inputs import reference_of
 
 
@@ -91,6 +92,7 @@ class FMQM_OT_measure(SteppedOperator, bpy.types.Operator):  # noqa: N801
             _write_row(scene.fmqm, outcome, self._settings_text)
         _choose_row(scene.fmqm, outcomes[0])
         forget_removed()  # of rows that these replace
+        show_heat_map(scene)
         failed = [outcome for outcome in outcomes if outcome.error]
         total = sum(outcome.seconds.get("total", 0.0) for outcome in outcomes)
         if failed:
@@ -155,8 +157,16 @@ def _write_row(fmqm: FMQMScene, outcome: Outcome, settings_text: str) -> None:
                 comparison=result.comparison,
                 reference_to_world=np.eye(4),  # it is measured where it stands
                 distorted_to_world=result.alignment.to_world,
+                reference_stood=_stand(outcome.reference_target),
+                distorted_stood=_stand(outcome.target),
             ),
         )
+
+
+def _stand(target: Target) -> Floats | None:
+    """(4, 4) the world matrix of a single object."""
+    members = target.members()
+    return np.array(members[0].matrix_world, np.float64) if len(members) == 1 else None
 
 
 def _choose_row(fmqm: FMQMScene, outcome: Outcome) -> None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import bpy
 
-from ...blender.display import scene_objects
 from ...metric.errors import FMQMError
-from ..view import cloud, units
+from ..view import heat, units
+from ..view.result import look_of
 from .view import has_samples
 
 _REACH = 14  # pixels around the mouse in which a sample is picked
@@ -29,8 +29,7 @@ class FMQM_OT_unit_pick(bpy.types.Operator):  # noqa: N801
 
     def invoke(self, context: bpy.types.Context, _: bpy.types.Event) -> set[str]:
         self._area = context.area
-        if scene_objects.find_object(context.scene, scene_objects.CLOUD) is None:
-            cloud.show_cloud(context.scene)
+        look_of(context.scene).show = heat.POINTS
         context.window.cursor_modal_set("CROSSHAIR")
         context.workspace.status_text_set(_STATUS)
         context.window_manager.modal_handler_add(self)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sub-panels that show a result in the 3D view: Look, Worst Places, NCF Debugging."""
+"""The sub-panels that show a result in the 3D view: Heat Map, Worst Places, NCF Debugging."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ from .. import session
 from ..operators.pick import FMQM_OT_unit_pick
 from ..operators.view import (
     FMQM_OT_clear,
-    FMQM_OT_look,
-    FMQM_OT_paint_surface,
+    FMQM_OT_keep,
     FMQM_OT_shells,
     FMQM_OT_slice,
     FMQM_OT_unit_step,
@@ -43,22 +42,25 @@ class FMQM_UL_worst(bpy.types.UIList):  # noqa: N801
 class FMQM_PT_look(Sidebar, bpy.types.Panel):  # noqa: N801
     bl_parent_id = PARENT
     bl_idname = "FMQM_PT_look"
-    bl_label = "Look"
+    bl_label = "Heat Map"
     bl_order = 3
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, look = self.layout, look_of(context.scene)
         layout.use_property_split, layout.use_property_decorate = True, False
         _say_if_gone(layout, context)
+        layout.row().prop(look, "show", expand=True)
         column = layout.column()
+        column.active = look.show != "OFF"
         column.prop(look, "layer")
         column.row().prop(look, "range", expand=True)
         column.row().prop(look, "place", expand=True)
-        column.prop(look, "point_size", slider=True)
-        column = layout.column(align=True)
-        column.operator(FMQM_OT_look.bl_idname, icon="POINTCLOUD_DATA")
-        column.operator(FMQM_OT_paint_surface.bl_idname, icon="BRUSH_DATA")
-        layout.operator(FMQM_OT_clear.bl_idname, icon="TRASH")
+        if look.show == "POINTS":
+            column.prop(look, "point_size", slider=True)
+        layout.prop(look, "show_after")
+        row = layout.row(align=True)
+        row.operator(FMQM_OT_keep.bl_idname, icon="FAKE_USER_ON")
+        row.operator(FMQM_OT_clear.bl_idname, icon="TRASH")
 
 
 class FMQM_PT_worst(Sidebar, bpy.types.Panel):  # noqa: N801

@@ -46,24 +46,37 @@ class FMQMWorstPatch(bpy.types.PropertyGroup):
 class FMQMLook(bpy.types.PropertyGroup):
     """What of the chosen result is shown, and how."""
 
-    layer: EnumProperty(
-        name="Color By", description="What the colors of the points mean", items=_LAYER_ITEMS, update=notify("layer")
+    show: EnumProperty(
+        name="Heat Map",
+        description="How the chosen result is drawn over the view. It is no data of the file: it cannot be selected, "
+        "rendered, exported or saved, and changes nothing else",
+        items=[
+            ("OFF", "Off", "The objects look as ever"),
+            ("SURFACE", "Surface", "Colors on the original and the LOD themselves, by the nearest patch"),
+            ("POINTS", "Points", "The samples as points, for a close look at the fields"),
+        ],
+        update=notify("show"),
     )
+    show_after: BoolProperty(
+        name="Show After Measuring", description="When a measurement ends, the heat map appears", default=True
+    )
+    layer: EnumProperty(name="Color By", description="What the colors mean", items=_LAYER_ITEMS, update=notify("layer"))
     range: EnumProperty(
         name="Range",
         description="Which values the ends of the color map stand for",
         items=[
-            ("FIXED", "Fixed", "0 to 1 for scores and colors; 1 or 2 % of the reference's size for distances"),
-            ("FITTED", "Fitted", "The values that occur, so that small differences show"),
+            ("FITTED", "Fitted", "Scores from their 5th percentile over all results to 1; other values as they occur"),
+            ("FIXED", "Fixed", "0 to 1 for scores and colors; 1 or 2 % of the original's size for distances"),
         ],
         update=notify("range"),
     )
     place: EnumProperty(
-        name="Place",
-        description="Where the points are shown",
+        name="Show On",
+        description="Where the heat map is shown",
         items=[
-            ("REFERENCE", "Reference", "Where the reference stands"),
-            ("COMPARED", "Compared", "Where the compared object stands"),
+            ("BOTH", "Both", "On the original and on the LOD"),
+            ("REFERENCE", "Original", "On the original"),
+            ("COMPARED", "LOD", "On the LOD"),
         ],
         update=notify("place"),
     )
@@ -76,7 +89,7 @@ class FMQMLook(bpy.types.PropertyGroup):
     worst: CollectionProperty(name="Worst Places", description="The patches of the lowest scores", type=FMQMWorstPatch)
     worst_index: IntProperty(
         name="Worst Place",
-        description="Frames this patch and shows only its points",
+        description="Frames this patch and shows only it",
         min=0,
         update=notify("worst_index"),
     )

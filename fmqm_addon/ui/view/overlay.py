@@ -22,8 +22,9 @@ from ...metric.geometry import Floats
 from .. import session
 from ..properties.rows import active_row
 from ..stored_text import read_legend
+from . import heat, shells
+from .legends import LEGEND
 
-LEGEND = "fmqm_legend"  # custom property of the objects that have a legend: report.visual.layers.Legend as JSON
 _FONT = 0
 _MARGIN, _PAD, _LINE, _GAP = 14, 10, 17, 8  # pixels at a UI scale of 1
 _BAR_WIDTH, _BAR_HEIGHT, _TICK = 14, 150, 4
@@ -75,7 +76,7 @@ def register() -> None:
     if bpy.app.background:
         return  # nothing will ever be drawn
     add = bpy.types.SpaceView3D.draw_handler_add
-    _handles.append(add(_draw_marks, (), "WINDOW", "POST_VIEW"))
+    _handles.append(add(_draw_in_space, (), "WINDOW", "POST_VIEW"))
     _handles.append(add(_draw_legends, (), "WINDOW", "POST_PIXEL"))
 
 
@@ -87,14 +88,14 @@ def unregister() -> None:
 
 
 def legends() -> list[dict[str, Any]]:
-    """The legends of our objects that this view shows."""
-    space = bpy.context.space_data
-    shown: list[dict[str, Any]] = []
-    for object_ in scene_objects.objects(bpy.context.scene):
+    """The legends of what this view shows."""
+    space, scene = bpy.context.space_data, bpy.context.scene
+    shown: list[dict[str, Any]] = [*heat.legends(scene, space), *shells.legends(scene, space)]
+    for object_ in scene_objects.objects(scene):
         if LEGEND in object_ and object_.visible_get(viewport=space):
             text = object_[LEGEND]
             legend = read_legend(text) if isinstance(text, str) else None
-            if legend is not None and legend not in shown:  # points and painted surface share theirs
+            if legend is not None:
                 shown.append(legend)
     return shown
 
@@ -261,6 +262,13 @@ def _picture_batch(picture: UnitPicture) -> Any:
     shader = gpu.shader.from_builtin("SMOOTH_COLOR")
     flat = np.column_stack([positions, np.zeros(len(positions))]).astype(np.float32)
     return batch_for_shader(shader, "TRIS", {"pos": flat, "color": colors.astype(np.float32)})
+
+
+def _draw_in_space() -> None:
+    """What stands in the scene's space: the heat map and the shells, and the marks of the figure over them."""
+    heat.draw()
+    shells.draw()
+    _draw_marks()
 
 
 def _draw_marks() -> None:
