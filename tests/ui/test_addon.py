@@ -615,7 +615,7 @@ def test_arrays_go_with_their_row(fmqm: FMQMScene, lods: list[bpy.types.Object],
     compare(lods[0], *lods[1:])
     bpy.ops.fmqm.measure()
     fmqm.row_index = 0
-    for act in (bpy.ops.fmqm.look, bpy.ops.fmqm.paint_surface, bpy.ops.fmqm.unit_step):
+    for act in (bpy.ops.fmqm.keep, bpy.ops.fmqm.slice, bpy.ops.fmqm.unit_step):
         act()
     held = remembered(fmqm)
     remove(fmqm)

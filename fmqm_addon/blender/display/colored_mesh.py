@@ -53,7 +53,7 @@ class ColoredMesh:
             vertices: (V, 3). triangles: (T, 3). entry: (V,) the row of the table of each vertex; the last vertex of a
                 triangle counts.
         """
-        self._arrays: tuple[Array, Array, Array] | None = (vertices, triangles, entry)
+        self.vertices, self._triangles, self._entry = vertices, triangles, entry
         self._batch: Any = None
         self._table: Any = None
         self.colors = np.zeros((0, 4), np.float32)
@@ -79,8 +79,7 @@ class ColoredMesh:
             return
         shader = _shader()
         if self._batch is None:
-            self._batch = _batch(*self._arrays) if self._arrays is not None else None
-            self._arrays = None  # the graphics card has them
+            self._batch = _batch(self.vertices, self._triangles, self._entry)
         if self._table is None:
             self._table = _texture(self.colors)
         depth, mask = gpu.state.depth_test_get(), gpu.state.depth_mask_get()

@@ -26,7 +26,7 @@ from ...report.visual.colormap import NO_PATCH
 from ...report.visual.heat_map import UNCOVERED, HeatMesh, fitted_range, heat_mesh
 from ...report.visual.shells import fields_at
 from .. import session
-from ..properties.rows import active_row, row_targets
+from ..properties.rows import FMQMRow, active_row, row_targets
 from .legends import legend_of
 from .result import POINT, look_of, measured_row, world_length, world_matrix
 
@@ -208,8 +208,7 @@ def draw() -> None:
     if row is None or measured is None:
         return
     for part in shown.parts:
-        target = row_targets(row)[0 if part.place == ORIGINAL else 1]
-        members = target.members()
+        members = members_at(row, part.place)
         if shown.show == SURFACE and not any(_is_seen(member, space) for member in members):
             continue
         if space.local_view is not None and not any(member.local_view_get(space) for member in members):
@@ -229,6 +228,11 @@ def _is_seen(member: bpy.types.Object, space: Any) -> bool:
         return member.mode != "EDIT" and member.visible_get(viewport=space)
     except RuntimeError:  # in none of the scene's layers
         return False
+
+
+def members_at(row: FMQMRow, place: str) -> list[bpy.types.Object]:
+    """The objects of the row's original, or of its LOD."""
+    return row_targets(row)[1 if place == LOD else 0].members()
 
 
 def placed(measured: session.Measured, place: str, members: list[bpy.types.Object]) -> Matrix:

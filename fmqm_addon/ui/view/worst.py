@@ -12,9 +12,10 @@ from ...metric.errors import FMQMError
 from ...metric.evaluation import Result
 from ...report.visual import layers
 from ...report.visual.worst import patch_view, worst_patches
+from ..properties.rows import active_row
 from ..properties.view import FMQMLook
 from . import heat
-from .result import look_of, measured_row, world_length, world_matrix
+from .result import look_of, measured_row, world_length
 
 WORST_COUNT = 20
 choosing = False  # the index of the worst places is being set from here
@@ -67,7 +68,9 @@ def focus_patch(scene: bpy.types.Scene, area: bpy.types.Area | None) -> None:
     heat.refresh(scene)
     center, diameter, normal = patch_view(result, look.worst[look.worst_index].patch)
     place = heat.LOD if look.place == heat.BOTH else look.place  # where the fault can be seen
-    matrix = world_matrix(measured, place)
+    row = active_row(scene)
+    members = [] if row is None else heat.members_at(row, place)
+    matrix = np.array(heat.placed(measured, place, members), np.float64)
     turned = np.linalg.inv(matrix[:3, :3]).T @ normal
     length = float(np.linalg.norm(turned))
     viewport.frame_place(
