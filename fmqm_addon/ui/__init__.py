@@ -7,6 +7,7 @@ import bpy
 
 from . import operators, panels, properties, stale
 from .operators import measure
+from .panels import swatches
 from .properties import scene
 from .view import updates
 
@@ -18,6 +19,7 @@ def register() -> None:
         bpy.utils.register_class(cls)
     scene.register()
     measure.register()
+    swatches.register()
     stale.register()
     updates.register()
 
@@ -26,6 +28,7 @@ def unregister() -> None:
     """The exact mirror of register."""
     updates.unregister()
     stale.unregister()
+    swatches.unregister()
     measure.unregister()
     scene.unregister()
     for cls in reversed(CLASSES):

@@ -84,6 +84,7 @@ def start() -> None:
     region.view_location = (3.2, 0, 0)
     for object_ in bpy.context.selected_objects:
         object_.select_set(False)
+    bpy.context.view_layer.objects.active = None  # whose origin would be drawn
 
 
 def measure() -> None:
@@ -137,6 +138,7 @@ def shown() -> None:
             bpy.ops.view3d.select(deselect_all=True, location=(x, y))
             picked |= {object_.name for object_ in bpy.context.selected_objects}
     bpy.ops.object.select_all(action="DESELECT")
+    bpy.context.view_layer.objects.active = None
     REPORT["picked"] = sorted(picked)
     REPORT["not ours"] = sorted(names)
 

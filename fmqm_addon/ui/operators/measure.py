@@ -127,6 +127,7 @@ def _write_row(fmqm: FMQMScene, outcome: Outcome, settings_text: str) -> None:
     if row is not None and row.scores and outcome.error and any(target.is_gone() for target in key):
         return
     row = row or fmqm.rows.add()
+    row.former = row.scores if row.settings == settings_text else ""
     row.uid = uuid.uuid4().hex
     row.name, row.kind = outcome.target.name, outcome.target.kind
     row.reference_name, row.reference_kind = outcome.reference_target.name, outcome.reference_target.kind

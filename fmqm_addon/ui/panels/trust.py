@@ -17,7 +17,7 @@ from .sidebar import Sidebar, room, wrapped
 
 class FMQM_PT_trust(Sidebar, bpy.types.Panel):  # noqa: N801
     bl_idname = "FMQM_PT_trust"
-    bl_parent_id = "FMQM_PT_results"
+    bl_parent_id = "FMQM_PT_details"
     bl_label = "Trust"
     bl_description = "What is known of the chosen result: how far to believe its score"
     bl_options: ClassVar = {"DEFAULT_CLOSED"}

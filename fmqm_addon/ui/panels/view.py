@@ -18,7 +18,7 @@ from ..operators.view import (
     FMQM_OT_worst_all,
     FMQM_OT_worst_step,
 )
-from ..properties.rows import active_row
+from ..properties.rows import active_row, row_scores
 from ..view.result import look_of
 from .sidebar import Sidebar
 
@@ -43,7 +43,11 @@ class FMQM_PT_look(Sidebar, bpy.types.Panel):  # noqa: N801
     bl_parent_id = PARENT
     bl_idname = "FMQM_PT_look"
     bl_label = "Heat Map"
-    bl_order = 3
+    bl_order = 2
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return has_result(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, look = self.layout, look_of(context.scene)
@@ -67,7 +71,11 @@ class FMQM_PT_worst(Sidebar, bpy.types.Panel):  # noqa: N801
     bl_parent_id = PARENT
     bl_idname = "FMQM_PT_worst"
     bl_label = "Worst Places"
-    bl_order = 4
+    bl_order = 3
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return has_result(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, look = self.layout, look_of(context.scene)
@@ -83,8 +91,12 @@ class FMQM_PT_ncf(Sidebar, bpy.types.Panel):  # noqa: N801
     bl_parent_id = PARENT
     bl_idname = "FMQM_PT_ncf"
     bl_label = "NCF Debugging"
-    bl_order = 5
+    bl_order = 6
     bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return has_result(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, look = self.layout, look_of(context.scene)
@@ -107,6 +119,12 @@ class FMQM_PT_ncf(Sidebar, bpy.types.Panel):  # noqa: N801
         column.prop(look, "shell_distance")
         column.prop(look, "shell_points")
         column.operator(FMQM_OT_shells.bl_idname, icon="MOD_THICKNESS")
+
+
+def has_result(context: bpy.types.Context) -> bool:
+    """Whether the chosen row has something to show; panels that have not are absent."""
+    row = active_row(context.scene)
+    return row is not None and row_scores(row) is not None
 
 
 def _say_if_gone(layout: Any, context: bpy.types.Context) -> None:

@@ -62,6 +62,7 @@ class FMQMRow(bpy.types.PropertyGroup):
     reference_kind: StringProperty(name="Reference Kind", description="Whether the reference is one or the other")
     bare_reference: BoolProperty(name="Bare Reference", description="The reference was measured without modifiers")
     scores: StringProperty(name="Scores", description="FMQM, perceived and their errors in double precision, as JSON")
+    former: StringProperty(name="Former Scores", description="As Scores, of the measurement before; empty: none")
     triangles: IntProperty(name="Triangles", description="Triangles of the compared object", min=0)
     share: FloatProperty(
         name="Share", description="Its triangles by those of the reference", min=0.0, subtype="PERCENTAGE"
@@ -115,6 +116,12 @@ def row_stderr(row: FMQMRow) -> dict[str, float] | None:
     return _numbers(readings.stderr, readings.perceived_stderr)
 
 
+def row_former(row: FMQMRow) -> dict[str, float] | None:
+    """row_scores of the measurement before, at equal settings; None where there was none."""
+    readings = stored_text.read_readings(row.former)
+    return None if readings is None else _numbers(readings.scores, readings.perceived)
+
+
 def row_reverse(row: FMQMRow) -> Readings | None:
     """Readings of the other direction, the compared as the reference; None where they were not measured."""
     return stored_text.read_readings(row.reverse)
@@ -166,6 +173,7 @@ def is_whole(row: FMQMRow) -> bool:
     readers = (
         (row.scores, stored_text.read_readings),
         (row.reverse, stored_text.read_readings),
+        (row.former, stored_text.read_readings),
         (row.attribution, stored_text.read_attribution),
         (row.trust, stored_text.read_trust),
         (row.parts, stored_text.read_parts),
