@@ -174,9 +174,11 @@ def test_worst_patches_name_who_is_to_blame(measured: session.Measured) -> None:
     scores[:, 3] = 0.4  # low everywhere: nothing special
     scores[2] = [0.9, 0.45, 0.9, 0.4, 0.3]
     scores[0] = [0.9, 0.9, 0.9, 0.1, 0.2]
-    result = dataclasses.replace(measured.comparison.result, patch_scores=scores, scores=Scores(*scores.mean(axis=0)))
+    result = dataclasses.replace(
+        measured.comparison.result, patch_scores=scores, patch_perceived=scores, scores=Scores(*scores.mean(axis=0))
+    )
     worst = worst_patches(result, 3)
-    assert [(w.patch, w.blame, w.value) for w in worst[:2]] == [(0, "colorGraSSIM", 0.1), (2, "geoGraSSIM", 0.45)]
+    assert [(w.patch, w.blame, w.value) for w in worst[:2]] == [(0, "detail", 0.1), (2, "detail", 0.4)]
     assert [w.patch for w in worst] == [0, 2, 1]
 
 

@@ -26,7 +26,7 @@ NUMBER = "number"  # only told apart
 
 FIXED_LENGTH = {LENGTH: 0.01, SIGNED: 0.02}  # upper end of the fixed range, in diagonals of the reference
 FIT_PERCENTILE = 99.0  # a fitted range of samples ends here: a few wild ones would flatten all others
-SIDE_NAMES = ("Outside both", "Inside both", "Inside reference only", "Inside compared only")
+SIDE_NAMES = ("Outside both", "Inside both", "Inside original only", "Inside LOD only")
 _SIDE_COLORS = np.array([GREY_LIGHT, GREY_DARK, VERMILION, SKY])
 _TICKS = 5
 
@@ -55,17 +55,17 @@ LAYERS: dict[str, Layer] = {
     layer.name: layer
     for layer in (
         Layer("FMQM", "FMQM", SCORE, "Quality of each patch: what the score is the mean of"),
-        Layer("geoSSIM", "Shape", SCORE, "geoSSIM: low where the surface moved away or lost relief"),
-        Layer("geoGraSSIM", "Direction", SCORE, "geoGraSSIM: low where the surface faces another way"),
-        Layer("colorSSIM", "Color", SCORE, "colorSSIM: low where colors changed or detail was lost"),
-        Layer("colorGraSSIM", "Color Edges", SCORE, "colorGraSSIM: low where edges in the texture moved or blurred"),
+        Layer("geoSSIM", "geoSSIM", SCORE, "Shape: low where the surface moved away or lost relief"),
+        Layer("geoGraSSIM", "geoGraSSIM", SCORE, "Facing: low where the surface faces another way"),
+        Layer("colorSSIM", "colorSSIM", SCORE, "Color: low where colors changed or detail was lost"),
+        Layer("colorGraSSIM", "colorGraSSIM", SCORE, "Detail: low where edges in the texture moved or blurred"),
         Layer("perceived", "Perceived", SCORE, "Perceived quality of each patch: what the score is the mean of"),
-        Layer("shape", "Perceived Shape", SCORE, "shape: low where the surface moved away or lost relief"),
-        Layer("facing", "Perceived Facing", SCORE, "facing: low where the surface faces another way, and shades so"),
-        Layer("color", "Perceived Color", SCORE, "color: low where colors or their contrast changed visibly"),
-        Layer("detail", "Perceived Detail", SCORE, "detail: low where the texture is blurred, moved or broken up"),
-        Layer("NCF_REFERENCE", "Color of Reference", COLOR, "NCF: the reference's color nearest to each sample"),
-        Layer("NCF_COMPARED", "Color of Compared", COLOR, "NCF: the compared object's color nearest to each sample"),
+        Layer("shape", "Shape", SCORE, "Low where the surface moved away or lost relief"),
+        Layer("facing", "Facing", SCORE, "Low where the surface faces another way, and shades so"),
+        Layer("color", "Color", SCORE, "Low where colors or their contrast changed visibly"),
+        Layer("detail", "Detail", SCORE, "Low where the texture is blurred, moved or broken up"),
+        Layer("NCF_REFERENCE", "Color of Original", COLOR, "NCF: the original's color nearest to each sample"),
+        Layer("NCF_COMPARED", "Color of LOD", COLOR, "NCF: the LOD's color nearest to each sample"),
         Layer(
             "NCF_DIFFERENCE",
             "Color Difference",
@@ -74,15 +74,15 @@ LAYERS: dict[str, Layer] = {
         ),
         Layer(
             "SDF_REFERENCE",
-            "Distance to Reference",
+            "Distance to Original",
             SIGNED,
-            "SDF: distance to the reference, negative inside",
+            "SDF: distance to the original, negative inside",
         ),
         Layer(
             "SDF_COMPARED",
-            "Distance to Compared",
+            "Distance to LOD",
             SIGNED,
-            "SDF: distance to the compared object, negative inside",
+            "SDF: distance to the LOD, negative inside",
         ),
         Layer(
             "SDF_DIFFERENCE",

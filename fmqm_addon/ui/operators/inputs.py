@@ -64,7 +64,7 @@ def reference_of(fmqm: FMQMScene) -> bpy.types.Object | bpy.types.Collection | N
 class FMQM_OT_use_selection(bpy.types.Operator):  # noqa: N801
     bl_idname = "fmqm.use_selection"
     bl_label = "Use Selection"
-    bl_description = "The active object becomes the reference, the other selected objects are compared with it"
+    bl_description = "The active object becomes the original, the other selected objects its LODs"
     bl_options: ClassVar = {"REGISTER", "UNDO"}
 
     @classmethod
@@ -97,7 +97,7 @@ class FMQM_OT_find_lods(bpy.types.Operator):  # noqa: N801
     bl_label = "Find LODs"
     bl_description = (
         "Find the levels of detail of the active object by names of objects, empties or collections (Rock_LOD0, "
-        "LOD1_Rock, x00_Rock, Rock_L0, Rock_high), an FBX LOD group or its collection. The finest is the reference"
+        "LOD1_Rock, x00_Rock, Rock_L0, Rock_high), an FBX LOD group or its collection. The finest is the original"
     )
     bl_options: ClassVar = {"REGISTER", "UNDO"}
 
@@ -146,7 +146,7 @@ class FMQM_OT_own_modifiers(bpy.types.Operator):  # noqa: N801
 class FMQM_OT_add_selected(bpy.types.Operator):  # noqa: N801
     bl_idname = "fmqm.add_selected"
     bl_label = "Add Selected"
-    bl_description = "Add the selected objects to the list, but for the reference"
+    bl_description = "Add the selected objects to the list, but for the original"
     bl_options: ClassVar = {"REGISTER", "UNDO"}
 
     @classmethod

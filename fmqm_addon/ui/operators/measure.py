@@ -32,26 +32,24 @@ def why_not(fmqm: FMQMScene) -> str:
     reference = reference_of(fmqm)
     if reference is None:
         gone = fmqm.reference_kind == "OBJECT" and fmqm.reference is not None
-        return (
-            f"{fmqm.reference.name} is gone; choose another reference" if gone else "Choose a reference: the original"
-        )
+        return f"{fmqm.reference.name} is gone; choose another original" if gone else "Choose the original"
     compared = [target for item in fmqm.compared if (target := item_target(item)) is not None]
     if not compared:
-        return "Add an object to compare with the reference"
+        return "Add an LOD to compare with the original"
     if reference in compared and not fmqm.bare_reference:
-        return f"{reference.name} is the reference and in the list too; remove it there, or use Own Modifiers"
+        return f"{reference.name} is the original and in the list too; remove it there, or use Own Modifiers"
     part = next((target for target in compared if are_kin(target, reference)), None)
     if part is not None:
         return f"{part.name} is measured with {reference.name}, as one hangs from the other; remove it from the list"
     if fmqm.bare_reference and (fmqm.reference_kind != "OBJECT" or reference.type != "MESH"):
-        return "Without Modifiers needs a single mesh object as the reference"
+        return "Without Modifiers needs a single mesh object as the original"
     return ""
 
 
 class FMQM_OT_measure(SteppedOperator, bpy.types.Operator):  # noqa: N801
     bl_idname = "fmqm.measure"
     bl_label = "Measure Quality"
-    bl_description = "Score the listed objects against the reference. Esc cancels"
+    bl_description = "Score the listed LODs against the original. Esc cancels"
     bl_options: ClassVar = {"UNDO"}  # no REGISTER: adjusting the last operation would measure all over again
 
     @classmethod

@@ -9,10 +9,14 @@ import bpy
 
 from ...comparison.alignment import SPACE_LABELS
 from ...comparison.judge import Judge
+from ...report.explain import verdict
+from ...report.records import pair_record
 from ..properties.rows import (
     EXPLAINED,
     FMQMRow,
     active_row,
+    is_whole,
+    pair_of,
     row_attribution,
     row_reverse,
     row_scores,
@@ -52,6 +56,8 @@ class FMQM_PT_details(Sidebar, bpy.types.Panel):  # noqa: N801
         if attribution is not None:
             phrase = attribution["phrase"]
             wrapped(self.layout, context, phrase[:1].upper() + phrase[1:], icon="INFO")
+        if is_whole(row):
+            wrapped(self.layout, context, verdict(pair_record(pair_of(row))), icon="INFO")
         note = self.layout.column()
         note.active = False
         wrapped(note, context, NOT_SEEN)

@@ -38,7 +38,7 @@ class FMQM_UL_compared(bpy.types.UIList):  # noqa: N801
         icon = "OUTLINER_COLLECTION"
         if isinstance(target, bpy.types.Object):
             icon = "OBJECT_DATA" if target.type == "MESH" else "EMPTY_DATA"
-        whole = width(context) - 64
+        whole = width(context) - 94
         split = layout.split(factor=1 - _COUNT / max(whole, 2 * _COUNT))
         name = cut_in_the_middle(target.name, int((whole - _COUNT) / CHARACTER) - 3)
         split.label(text=name, icon=icon, translate=False)

@@ -49,8 +49,7 @@ class FMQM_UL_rows(bpy.types.UIList):  # noqa: N801
         scores, chosen = row_scores(row), active_row(context.scene)
         layout.active = chosen is None or comparable(row, chosen)
         cells = _cells(row, scores)
-        name, *rest = _columns(context)
-        for (column, share), place in _split(layout, [name, *rest]):
+        for (column, share), place in _split(layout, columns_for(width(context), context.scene.fmqm.judge)):
             if column == "name":
                 text = cut_in_the_middle(row.name, int(share / CHARACTER) - 4)
                 place.label(text=text, icon=icon, translate=False)
@@ -74,19 +73,19 @@ def _cells(row: FMQMRow, scores: dict[str, float] | None) -> dict[str, str]:
 # Columns of the table with their heads and widths, in pixels at scale 1, in the order in which they appear; the number
 # says from which width of the sidebar on.
 _TABLE = (
-    ("triangles", "Tris", 46, 330),
-    ("share", "Share", 42, 280),
-    ("FMQM", "FMQM", 46, 0),
-    ("perceived", "Perc.", 46, 225),
+    ("triangles", "Tris", 50, 340),
+    ("share", "Share", 48, 290),
+    ("FMQM", "FMQM", 54, 0),
+    ("perceived", "Perc.", 54, 235),
     ("bar", "", 40, 400),
 )
-_BESIDE = 62  # of the list: what is left and right of the columns
+_SENTENCES = 2  # of the explanation that stand with the verdict
+_BESIDE = 94  # of the list: what is left and right of the columns
 
 
-def _columns(context: bpy.types.Context) -> list[tuple[str, float]]:
-    """The columns that the sidebar has room for, with their widths; the name gets the rest."""
-    whole = width(context)
-    judge = Judge[context.scene.fmqm.judge].column
+def columns_for(whole: float, judge_name: str) -> list[tuple[str, float]]:
+    """The columns that a sidebar of so many pixels at scale 1 has room for, with widths; the name gets the rest."""
+    judge = Judge[judge_name].column
     narrow = whole < min(least for name, _, _, least in _TABLE if name == "perceived")
     shown = [
         (name, float(wide))
@@ -158,8 +157,13 @@ def _draw_heads(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     row = layout.row()
     row.active = False
     row.scale_y = 0.8
-    for (column, _), place in _split(row, _columns(context)):
+    for (column, _), place in _split(row, columns_for(width(context), context.scene.fmqm.judge)):
         place.label(text="    LOD" if column == "name" else heads[column])
+
+
+def _beginning(text: str) -> str:
+    """The first sentences; Details has them all."""
+    return ". ".join(text.split(". ")[:_SENTENCES]).removesuffix(".") + "."
 
 
 def _draw_verdict(layout: bpy.types.UILayout, context: bpy.types.Context, fmqm: FMQMScene, row: FMQMRow) -> None:
@@ -175,7 +179,7 @@ def _draw_verdict(layout: bpy.types.UILayout, context: bpy.types.Context, fmqm: 
         heading = record["impairment"]
         box.label(text=heading[:1].upper() + heading[1:], icon_value=swatch(scores["perceived"]))
         note = box.column()
-        wrapped(note, context, verdict(record))
+        wrapped(note, context, _beginning(verdict(record)))
     numbers = box.column(align=True)
     for judge in Judge:
         was = "" if former is None else f", was {former[judge.column]:.2f}"
@@ -184,7 +188,7 @@ def _draw_verdict(layout: bpy.types.UILayout, context: bpy.types.Context, fmqm: 
         split.label(text=f"{scores[judge.column]:.4f}{was}")
     bars = box.column(align=True)
     for name in Judge[fmqm.judge].features:
-        split = bars.split(factor=0.4)
+        split = bars.split(factor=0.5)
         label = split.row()
         label.alignment = "LEFT"
         label.operator(

@@ -53,15 +53,18 @@ class FMQM_PT_look(Sidebar, bpy.types.Panel):  # noqa: N801
         layout, look = self.layout, look_of(context.scene)
         layout.use_property_split, layout.use_property_decorate = True, False
         _say_if_gone(layout, context)
-        layout.row().prop(look, "show", expand=True)
+        _switch(layout, look, "show")
         column = layout.column()
         column.active = look.show != "OFF"
         column.prop(look, "layer")
         column.row().prop(look, "range", expand=True)
-        column.row().prop(look, "place", expand=True)
+        column.label(text="Show On")
+        _switch(column, look, "place")
         if look.show == "POINTS":
             column.prop(look, "point_size", slider=True)
-        layout.prop(look, "show_after")
+        row = layout.row()
+        row.use_property_split = False
+        row.prop(look, "show_after")
         row = layout.row(align=True)
         row.operator(FMQM_OT_keep.bl_idname, icon="FAKE_USER_ON")
         row.operator(FMQM_OT_clear.bl_idname, icon="TRASH")
@@ -125,6 +128,13 @@ def has_result(context: bpy.types.Context) -> bool:
     """Whether the chosen row has something to show; panels that have not are absent."""
     row = active_row(context.scene)
     return row is not None and row_scores(row) is not None
+
+
+def _switch(layout: bpy.types.UILayout, look: Any, name: str) -> None:
+    """A choice of buttons over the whole width, where their names are not cut."""
+    row = layout.row()
+    row.use_property_split = False
+    row.prop(look, name, expand=True)
 
 
 def _say_if_gone(layout: Any, context: bpy.types.Context) -> None:

@@ -99,8 +99,8 @@ class FMQMLook(bpy.types.PropertyGroup):
         name="Surface",
         description="Whose colors the shells show",
         items=[
-            ("REFERENCE", "Reference", "Colors of the reference around it"),
-            ("COMPARED", "Compared", "Colors of the compared object around it"),
+            ("REFERENCE", "Original", "Colors of the original around it"),
+            ("COMPARED", "LOD", "Colors of the LOD around it"),
         ],
     )
     shell_layout: EnumProperty(
@@ -113,7 +113,7 @@ class FMQMLook(bpy.types.PropertyGroup):
     )
     shell_distance: FloatProperty(
         name="Distance",
-        description="Between two shells, in percent of the reference's size",
+        description="Between two shells, in percent of the original's size",
         default=2.0, min=0.001, max=100.0, soft_max=10.0, step=10, precision=2, subtype="PERCENTAGE",
     )  # fmt: skip
     shell_points: IntProperty(

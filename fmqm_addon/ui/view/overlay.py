@@ -224,7 +224,7 @@ def _draw_figure(ink: _Ink, shown: UnitFigure, x: float, y: float) -> None:
     width, height = label + 2 * side + 3 * pad, 2 * side + 2 * line + 3 * pad
     _box(x, y, width, height, ink.back)
     ink.write(shown.title, x + pad, y + height - pad - px(12))
-    for column, text in enumerate(("Reference", "Compared")):
+    for column, text in enumerate(("Original", "LOD")):
         ink.write(text, x + pad + label + column * (side + pad), y + height - pad - px(12) - line, ink.faint)
     if not shown.batches:
         shown.batches.extend(_picture_batch(picture) for picture in shown.pictures)

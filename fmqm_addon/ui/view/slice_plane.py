@@ -64,7 +64,7 @@ def draw_slice(scene: bpy.types.Scene) -> None:
     colors[_borders((cut < 0).reshape(resolution, resolution)).ravel()] = OUTLINE
     scene_objects.draw_slice(plane, colors)
     plane[UID], plane[_SLICE_MATRIX] = uid, _flat(plane)
-    which = "compared" if look.slice_layer.endswith("COMPARED") else "reference"
+    which = "LOD" if look.slice_layer.endswith("COMPARED") else "original"
     explain(scene, plane, look.slice_layer, ends, measured.comparison.result, name, f"dark line: {which}")
     viewport.redraw()
 
