@@ -26,6 +26,7 @@ from fmqm_addon.metric.sampling import Samples
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.surface import triangle_areas
 from fmqm_addon.report.visual import colormap, layers
+from fmqm_addon.report.visual.heat_map import UNCOVERED
 from fmqm_addon.report.visual.shells import SHELLS, fields_at, shell_points, slice_points
 from fmqm_addon.report.visual.units import unit_grid, unit_of
 from fmqm_addon.report.visual.worst import worst_patches
@@ -304,6 +305,58 @@ def test_every_layer_shows(scene: bpy.types.Scene, measured: session.Measured) -
     show_points()
     look.layer = "NCF_REFERENCE"
     assert point_colors() == pytest.approx(measured.comparison.result.ref.ncf, abs=1e-5)
+
+
+def test_only_what_is_below_is_shown(scene: bpy.types.Scene, measured: session.Measured) -> None:
+    scores = measured.comparison.result.of_patches("FMQM")
+    look, middle = scene.fmqm.look, float(np.median(scores))
+    for show in (show_points, show_surface):
+        show()
+        look.only_below, look.below = True, middle
+        for part, _ in enumerate(drawn().parts):
+            assert (seen(part) == (scores < look.below)[drawn().parts[part].patch]).all() and seen(part).any()
+        look.only_below = False
+        assert seen().all()
+
+
+def test_ends_of_ones_own(scene: bpy.types.Scene, measured: session.Measured) -> None:
+    show_surface()
+    scene.fmqm.look.low, scene.fmqm.look.high, scene.fmqm.look.range = 0.25, 0.75, "CUSTOM"
+    assert drawn().ends == pytest.approx((0.25, 0.75))
+    scene.fmqm.look.low = 0.9  # beyond the other
+    low, high = drawn().ends
+    assert low < high
+
+
+def test_the_legend_counts_all_patches(scene: bpy.types.Scene) -> None:
+    show_surface()
+    assert max(legend()["histogram"]) == 1.0
+    scene.fmqm.look.layer = "NCF_REFERENCE"
+    assert "histogram" not in legend()
+
+
+def test_quick_results_do_not_paint_the_rest(scene: bpy.types.Scene, measured: session.Measured) -> None:
+    few = 3
+    old = measured.comparison.result
+    inside = old.samples.patch < few
+    samples = dataclasses.replace(
+        old.samples,
+        positions=old.samples.positions[inside],
+        patch=old.samples.patch[inside],
+        start=old.samples.start[: few + 1],
+    )
+    result = dataclasses.replace(
+        old, patches=old.patches[:few], patch_centers=old.patch_centers[:few], samples=samples,
+        patch_scores=old.patch_scores[:few], patch_perceived=old.patch_perceived[:few],
+    )  # fmt: skip
+    session.put(
+        "row", dataclasses.replace(measured, comparison=dataclasses.replace(measured.comparison, result=result))
+    )
+    show_surface()
+    original = drawn().parts[0]
+    assert 0.3 < (original.patch == UNCOVERED).mean() < 1
+    assert np.abs(point_colors()[original.patch == UNCOVERED] - colormap.NO_PATCH).max() < 1e-6
+    assert legend()["note"] == "grey: not among the 3 patches"
 
 
 def test_a_fitted_range_holds_for_all_rows(scene: bpy.types.Scene, measured: session.Measured) -> None:

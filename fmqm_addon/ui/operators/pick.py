@@ -45,7 +45,7 @@ class FMQM_OT_unit_pick(bpy.types.Operator):  # noqa: N801
         if event.type != "LEFTMOUSE" or event.value != "PRESS":
             return {"PASS_THROUGH"}
         region = next((r for r in self._area.regions if r.type == "WINDOW"), None)
-        if region is None or not _holds(self._area, region, event):
+        if region is None or not holds(self._area, region, event):
             return {"PASS_THROUGH"}  # buttons go on working
         at = (event.mouse_x - region.x, event.mouse_y - region.y)
         reach = _REACH * context.preferences.system.ui_scale
@@ -68,7 +68,7 @@ class FMQM_OT_unit_pick(bpy.types.Operator):  # noqa: N801
         return {"FINISHED"}
 
 
-def _holds(area: bpy.types.Area, window: bpy.types.Region, event: bpy.types.Event) -> bool:
+def holds(area: bpy.types.Area, window: bpy.types.Region, event: bpy.types.Event) -> bool:
     """Whether the mouse is in the view and not over a toolbar or the sidebar."""
 
     def within(region: bpy.types.Region) -> bool:

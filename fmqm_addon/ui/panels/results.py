@@ -16,6 +16,7 @@ from ..properties.rows import (
     FMQMRow,
     active_row,
     comparable,
+    is_quick,
     is_whole,
     pair_of,
     row_former,
@@ -39,7 +40,7 @@ class FMQM_UL_rows(bpy.types.UIList):  # noqa: N801
         _active_data: FMQMScene,
         _active_property: str,
     ) -> None:
-        icon = "BLANK1"  # names stay in line
+        icon = "NONE"
         if row.error or row_scores(row) is None:
             icon = "CANCEL"
         elif row.uid in session.stale:
@@ -51,7 +52,7 @@ class FMQM_UL_rows(bpy.types.UIList):  # noqa: N801
         cells = _cells(row, scores)
         for (column, share), place in _split(layout, columns_for(width(context), context.scene.fmqm.judge)):
             if column == "name":
-                text = cut_in_the_middle(row.name, int(share / CHARACTER) - 4)
+                text = cut_in_the_middle(row.name, int(share / CHARACTER) - (2 if icon == "NONE" else 5))
                 place.label(text=text, icon=icon, translate=False)
             elif column == "bar" and scores is not None:
                 place.progress(factor=scores["perceived"], text="")
@@ -73,10 +74,10 @@ def _cells(row: FMQMRow, scores: dict[str, float] | None) -> dict[str, str]:
 # Columns of the table with their heads and widths, in pixels at scale 1, in the order in which they appear; the number
 # says from which width of the sidebar on.
 _TABLE = (
-    ("triangles", "Tris", 50, 340),
-    ("share", "Share", 48, 290),
-    ("FMQM", "FMQM", 54, 0),
-    ("perceived", "Perc.", 54, 235),
+    ("triangles", "Tris", 46, 330),
+    ("share", "Share", 46, 300),
+    ("FMQM", "FMQM", 48, 0),
+    ("perceived", "Perc.", 48, 240),
     ("bar", "", 40, 400),
 )
 _SENTENCES = 2  # of the explanation that stand with the verdict
@@ -158,7 +159,7 @@ def _draw_heads(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     row.active = False
     row.scale_y = 0.8
     for (column, _), place in _split(row, columns_for(width(context), context.scene.fmqm.judge)):
-        place.label(text="    LOD" if column == "name" else heads[column])
+        place.label(text="LOD" if column == "name" else heads[column])
 
 
 def _beginning(text: str) -> str:
@@ -199,6 +200,11 @@ def _draw_verdict(layout: bpy.types.UILayout, context: bpy.types.Context, fmqm: 
         wrapped(layout, context, session.stale[row.uid], icon="FILE_REFRESH")
     elif session.get(row.uid) is None:
         wrapped(layout, context, "Measured in an earlier session: measure again for the heat map", icon="INFO")
+    if is_quick(row):
+        text = (
+            f"{row.patches} patches were measured; what lies between them is grey. Choose Full for the score to report"
+        )
+        wrapped(layout, context, text, icon="INFO")
     if row.warnings:
         box = layout.box().column()
         for warning in row.warnings.splitlines():

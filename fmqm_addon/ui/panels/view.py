@@ -9,6 +9,7 @@ import bpy
 
 from .. import session
 from ..operators.pick import FMQM_OT_unit_pick
+from ..operators.probe import FMQM_OT_probe
 from ..operators.view import (
     FMQM_OT_clear,
     FMQM_OT_keep,
@@ -57,7 +58,16 @@ class FMQM_PT_look(Sidebar, bpy.types.Panel):  # noqa: N801
         column = layout.column()
         column.active = look.show != "OFF"
         column.prop(look, "layer")
-        column.row().prop(look, "range", expand=True)
+        column.prop(look, "range")
+        if look.range == "CUSTOM":
+            pair = column.column(align=True)
+            pair.prop(look, "low", slider=True)
+            pair.prop(look, "high", slider=True)
+        row = column.row(heading="Only Below")
+        row.prop(look, "only_below", text="")
+        number = row.row()
+        number.active = look.only_below
+        number.prop(look, "below", text="", slider=True)
         column.label(text="Show On")
         _switch(column, look, "place")
         if look.show == "POINTS":
@@ -65,6 +75,7 @@ class FMQM_PT_look(Sidebar, bpy.types.Panel):  # noqa: N801
         row = layout.row()
         row.use_property_split = False
         row.prop(look, "show_after")
+        layout.operator(FMQM_OT_probe.bl_idname, icon="EYEDROPPER")
         row = layout.row(align=True)
         row.operator(FMQM_OT_keep.bl_idname, icon="FAKE_USER_ON")
         row.operator(FMQM_OT_clear.bl_idname, icon="TRASH")

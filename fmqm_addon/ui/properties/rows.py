@@ -161,6 +161,12 @@ def settings_name(row: FMQMRow) -> str:
     return "Custom"
 
 
+def is_quick(row: FMQMRow) -> bool:
+    """Whether only some of the patches were scored."""
+    used = stored_text.read_settings(row.settings)
+    return used is not None and used["scored_patches"] is not None and row.patches < used["patches"]
+
+
 def comparable(row: FMQMRow, other: FMQMRow) -> bool:
     """Whether the scores of two rows may be compared: they were measured at equal settings."""
     return row.settings == other.settings or _settings_that_count(row) == _settings_that_count(other)

@@ -66,10 +66,26 @@ class FMQMLook(bpy.types.PropertyGroup):
         description="Which values the ends of the color map stand for",
         items=[
             ("FITTED", "Fitted", "Scores from their 5th percentile over all results to 1; other values as they occur"),
+            ("CUSTOM", "Custom", "Ends of your own for scores; the probe drags them in the legend"),
             ("FIXED", "Fixed", "0 to 1 for scores and colors; 1 or 2 % of the original's size for distances"),
         ],
         update=notify("range"),
     )
+    low: FloatProperty(
+        name="Low", description="Score at the hot end", default=0.5, min=0.0, max=0.999, step=1, precision=3,
+        update=notify("range"),
+    )  # fmt: skip
+    high: FloatProperty(
+        name="High", description="Score at the dark end", default=1.0, min=0.001, max=1.0, step=1, precision=3,
+        update=notify("range"),
+    )  # fmt: skip
+    only_below: BoolProperty(
+        name="Only Below", description="Show only patches with a lower score", default=False, update=notify("show")
+    )
+    below: FloatProperty(
+        name="Below", description="Patches above this score are not shown", default=0.8, min=0.0, max=1.0, step=1,
+        precision=3, update=notify("show"),
+    )  # fmt: skip
     place: EnumProperty(
         name="Show On",
         description="Where the heat map is shown",

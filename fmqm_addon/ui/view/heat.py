@@ -23,7 +23,7 @@ from ...metric.errors import FMQMError
 from ...metric.geometry import Floats, Ints
 from ...report.visual import layers
 from ...report.visual.colormap import NO_PATCH
-from ...report.visual.heat_map import UNCOVERED, HeatMesh, fitted_range, heat_mesh
+from ...report.visual.heat_map import UNCOVERED, HeatMesh, fitted_range, heat_mesh, histogram
 from ...report.visual.shells import fields_at
 from .. import session
 from ..properties.rows import FMQMRow, active_row, row_targets
@@ -78,7 +78,9 @@ def wanted(scene: bpy.types.Scene) -> tuple[Any, ...] | None:
         return None
     size = look.point_size if look.show == POINTS else 0.0
     rows = tuple(each.uid for each in scene.fmqm.rows)
-    return (row.uid, look.show, look.layer, look.range, look.place, size, focused_patch(scene), rows)
+    custom = (look.low, look.high) if look.range == "CUSTOM" else ()
+    below = look.below if look.only_below else None
+    return (row.uid, look.show, look.layer, look.range, look.place, size, focused_patch(scene), below, custom, rows)
 
 
 def focused_patch(scene: bpy.types.Scene) -> int | None:
@@ -137,18 +139,42 @@ def _build(scene: bpy.types.Scene, key: tuple[Any, ...], before: Shown | None) -
         of_parts = [_field_values(measured, look.layer, part, fields, length) for part in parts]
         ends = layers.value_range(look.layer, np.concatenate(of_parts), look.range != "FIXED", length)
         colors = [layers.layer_colors(look.layer, each, *ends) for each in of_parts]
-    only = focused_patch(scene)
+    only = seen_patches(scene, values)
     for part, color in zip(parts, colors, strict=True):
-        part.mesh.set_colors(color, True if only is None else part.patch == only)
+        part.mesh.set_colors(color, only[part.patch])
     legend = legend_of(scene, look.layer, ends, result, measured.comparison.distorted.name)
     if any((part.patch == UNCOVERED).any() for part in parts):
         legend["note"] = f"grey: not among the {len(result.patches)} patches"
+    if values is not None and layers.LAYERS[look.layer].kind == layers.SCORE:
+        counts = histogram(values, *ends)
+        legend["histogram"] = (counts / max(int(counts.max()), 1)).tolist()
     return Shown(key, uid, look.show, look.layer, parts, ends, legend, values, fields)
+
+
+def seen_patches(scene: bpy.types.Scene, values: Floats | None) -> NDArray[np.bool_]:
+    """(P + 1,) which patches are shown, the last one being what no patch covers.
+
+    Args:
+        values: (P,) of the layer, where it has one a patch.
+    """
+    look, only = look_of(scene), focused_patch(scene)
+    _, _, measured = measured_row(scene)
+    count = len(measured.comparison.result.patches)
+    seen = np.ones(count + 1, bool)
+    if only is not None:
+        seen[:] = np.arange(count + 1) == only
+    if look.only_below and values is not None and layers.LAYERS[look.layer].kind == layers.SCORE:
+        seen[:-1] &= values < look.below
+        seen[-1] = False
+    return seen
 
 
 def score_range(scene: bpy.types.Scene, layer: str) -> tuple[float, float]:
     """The ends of the colors of a layer with a value a patch; fitted ones hold for all rows, so that these compare."""
-    if look_of(scene).range == "FIXED" or layers.LAYERS[layer].kind != layers.SCORE:
+    look = look_of(scene)
+    if look.range == "CUSTOM" and layers.LAYERS[layer].kind == layers.SCORE:
+        return min(look.low, look.high - 0.001), look.high
+    if look.range == "FIXED" or layers.LAYERS[layer].kind != layers.SCORE:
         return 0.0, 1.0
     known = [measured for row in scene.fmqm.rows if (measured := session.get(row.uid)) is not None]
     return fitted_range(np.concatenate([layers.patch_values(each.comparison.result, layer) for each in known]))
