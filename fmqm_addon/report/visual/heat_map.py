@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...metric.evaluation import Result
+from ...metric.fields import Fields
 from ...metric.geometry import Floats, Ints
 from ...metric.patches import split_edges
+from ...metric.surface import Surface
 
 UNCOVERED = -1  # the patch of a place that was not measured
 LOW_PERCENTILE = 5.0  # of the patches of all rows: where a fitted range begins
@@ -19,8 +21,7 @@ BARS = 32  # of a histogram
 
 _PIECES = 6  # a triangle is split for display where it is longer than this part of a patch
 _MOST_TRIANGLES = 400_000  # that splitting may make; a mesh with more has small ones anyway
-_DISC = np.sqrt(1 / 8)  # radius of a disc by the diagonal of its bounding box, however it is turned
-_REACH = 1.3  # a patch is no disc: how much further than one it may reach
+_SPACINGS = 1.0  # of samples: a place with none within about so many was not measured
 _CHUNK = 1 << 22  # elements of a distance table at once
 _STEPS = (1.0, 2.0, 5.0)
 _LEAST_STEP = 0.002  # of a fitted range: below it, all is alike
@@ -45,11 +46,45 @@ class HeatMesh:
         return centers
 
 
-def heat_mesh(vertices: Floats, triangles: Ints, result: Result) -> HeatMesh:
-    """A surface in the metric's frame, painted by the patches; triangles larger than a part of one are split."""
+def heat_mesh(surface: Surface, result: Result, fields: Fields) -> HeatMesh:
+    """One of the two surfaces, painted by the patches; triangles longer than a part of one are split.
+
+    Args:
+        fields: of this surface at the samples.
+    """
     limit = float(np.median([patch.diagonal for patch in result.patches])) / _PIECES
-    vertices, triangles = split_large(vertices, triangles, limit)
-    return HeatMesh(vertices, triangles, nearest_patches(vertices[triangles].mean(axis=1), result))
+    vertices, triangles = split_large(surface.vertices, surface.triangles, limit)
+    return HeatMesh(vertices, triangles, patches_at(vertices[triangles].mean(axis=1), result, fields))
+
+
+def patches_at(points: Floats, result: Result, fields: Fields) -> Ints:
+    """(N,) the patch that (N, 3) points of a surface are painted by: the nearest.
+
+    Where only some of the patches were scored, places without samples around them are UNCOVERED.
+    """
+    patch = nearest_patches(points, result)
+    if len(result.patches) < result.settings.patches:
+        area = sum(patch.area for patch in result.patches)
+        patch[~has_near(points, fields.nearest, _SPACINGS * float(np.sqrt(area / len(fields.nearest))))] = UNCOVERED
+    return patch
+
+
+def has_near(points: Floats, others: Floats, reach: float) -> NDArray[np.bool_]:
+    """(N,) whether one of the others lies within about a reach: in the same cell of a grid, or in one beside it."""
+    low = np.minimum(points.min(axis=0), others.min(axis=0)) - reach
+    sides = np.maximum(points.max(axis=0), others.max(axis=0)) - low
+    width = int(sides.max() / reach) + 3
+
+    def keys(cells: Ints) -> Ints:
+        joined: Ints = (cells[:, 0] * width + cells[:, 1]) * width + cells[:, 2]
+        return joined
+
+    taken = np.unique(keys(((others - low) / reach).astype(np.int64)))
+    here = ((points - low) / reach).astype(np.int64)
+    found = np.zeros(len(points), bool)
+    for step in np.ndindex(3, 3, 3):
+        found |= np.isin(keys(here + np.array(step) - 1), taken)
+    return found
 
 
 def split_large(vertices: Floats, triangles: Ints, limit: float) -> tuple[Floats, Ints]:
@@ -64,10 +99,7 @@ def split_large(vertices: Floats, triangles: Ints, limit: float) -> tuple[Floats
 
 
 def nearest_patches(points: Floats, result: Result) -> Ints:
-    """(N,) the patch whose center is nearest to each of (N, 3) points of the metric's frame.
-
-    Where only some of the patches were scored, places out of their reach are UNCOVERED.
-    """
+    """(N,) the patch whose center is nearest to each of (N, 3) points of the metric's frame."""
     centers = result.patch_centers.astype(np.float32)
     squares = (centers * centers).sum(axis=1)
     nearest = np.empty(len(points), np.int64)
@@ -75,10 +107,6 @@ def nearest_patches(points: Floats, result: Result) -> Ints:
     for first in range(0, len(points), step):
         here = points[first : first + step].astype(np.float32)
         nearest[first : first + step] = (squares - 2 * here @ centers.T).argmin(axis=1)
-    if len(result.patches) < result.settings.patches:
-        reach = np.array([patch.diagonal for patch in result.patches]) * (_DISC * _REACH)
-        away = np.linalg.norm(points - result.patch_centers[nearest], axis=1)
-        nearest[away > reach[nearest]] = UNCOVERED
     return nearest
 
 

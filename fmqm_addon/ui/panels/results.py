@@ -201,9 +201,7 @@ def _draw_verdict(layout: bpy.types.UILayout, context: bpy.types.Context, fmqm: 
     elif session.get(row.uid) is None:
         wrapped(layout, context, "Measured in an earlier session: measure again for the heat map", icon="INFO")
     if is_quick(row):
-        text = (
-            f"{row.patches} patches were measured; what lies between them is grey. Choose Full for the score to report"
-        )
+        text = f"{row.patches} patches were measured; what lies between is grey. Full gives the score to report"
         wrapped(layout, context, text, icon="INFO")
     if row.warnings:
         box = layout.box().column()

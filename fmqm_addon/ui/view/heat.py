@@ -20,7 +20,10 @@ from ...blender.display import viewport
 from ...blender.display.colored_mesh import ColoredMesh, from_faces
 from ...blender.display.scene_objects import tetrahedra
 from ...metric.errors import FMQMError
+from ...metric.evaluation import Result
+from ...metric.fields import Fields
 from ...metric.geometry import Floats, Ints
+from ...metric.surface import Surface
 from ...report.visual import layers
 from ...report.visual.colormap import NO_PATCH
 from ...report.visual.heat_map import UNCOVERED, HeatMesh, fitted_range, heat_mesh, histogram
@@ -185,14 +188,21 @@ def _part(look: Any, measured: session.Measured, place: str, old: Part | None) -
     if look.show == SURFACE:
         if old is not None:
             return old
-        surface = measured.reference if place == ORIGINAL else measured.comparison.distorted
-        heat = heat_mesh(surface.vertices, surface.triangles, result)
+        heat = heat_mesh(*surface_at(measured, place))
         mesh = from_faces(heat.vertices, heat.triangles, np.arange(len(heat.triangles)))
         return Part(place, mesh, heat.patch, heat)
     size = look.point_size * POINT * spacing(measured)
     if old is not None and old.size == size:
         return old
     return Part(place, points_mesh(result.samples.positions, size), result.samples.patch.astype(np.int64), None, size)
+
+
+def surface_at(measured: session.Measured, place: str) -> tuple[Surface, Result, Fields]:
+    """The original or the LOD, with the result, and its own fields at the samples."""
+    result = measured.comparison.result
+    if place == LOD:
+        return measured.comparison.distorted, result, result.dist
+    return measured.reference, result, result.ref
 
 
 def points_mesh(positions: Floats, size: float) -> ColoredMesh:

@@ -11,7 +11,7 @@ from bpy_extras.view3d_utils import region_2d_to_origin_3d, region_2d_to_vector_
 
 from ...comparison.judge import Judge
 from ...report.visual import layers
-from ...report.visual.heat_map import UNCOVERED, nearest_patches
+from ...report.visual.heat_map import UNCOVERED, patches_at
 from .. import session
 from ..properties.rows import active_row
 from . import heat
@@ -36,7 +36,7 @@ def probe(
     origin, direction = region_2d_to_origin_3d(region, view, at), region_2d_to_vector_3d(region, view, at)
     found: list[tuple[float, Probed]] = []
     for part in shown.parts:
-        surface = measured.reference if part.place == heat.ORIGINAL else measured.comparison.distorted
+        surface, result, fields = heat.surface_at(measured, part.place)
         matrix = heat.placed(measured, part.place, heat.members_at(row, part.place))
         back = matrix.inverted_safe()
         start, towards = back @ origin, back.to_3x3() @ direction
@@ -45,7 +45,7 @@ def probe(
         if triangle[0] < 0:
             continue
         hit = start + towards * float(distance[0])
-        patch = int(nearest_patches(np.array([hit]), measured.comparison.result)[0])
+        patch = int(patches_at(np.array([hit]), result, fields)[0])
         depth = (matrix @ hit - origin).dot(direction)
         found.append((depth, Probed(part.place == heat.ORIGINAL, patch)))
     return min(found, key=lambda each: each[0])[1] if found else None
