@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import bpy
 
-from . import operators, panels, properties, stale
+from . import operators, panels, preferences, properties, stale
 from .operators import measure
 from .panels import swatches
 from .properties import scene
 from .view import updates
 
-CLASSES: tuple[type, ...] = (*properties.CLASSES, *operators.CLASSES, *panels.CLASSES)
+CLASSES: tuple[type, ...] = (*preferences.CLASSES, *properties.CLASSES, *operators.CLASSES, *panels.CLASSES)
 
 
 def register() -> None:

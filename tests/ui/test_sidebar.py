@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
+import json
+import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 import bpy
 import pytest
@@ -11,6 +14,7 @@ import pytest
 import fmqm_addon
 from fmqm_addon.blender.scene.target import target_of
 from fmqm_addon.blender.scene.triangle_count import triangle_count
+from fmqm_addon.ui import preferences
 from fmqm_addon.ui.panels.results import columns_for
 from fmqm_addon.ui.panels.sidebar import cut_in_the_middle, short_count
 from fmqm_addon.ui.properties.rows import active_row, row_former, row_scores
@@ -89,3 +93,21 @@ def test_a_row_tells_its_former_score(scene: bpy.types.Scene) -> None:
     scene.fmqm.look.show_after, scene.fmqm.look.show = False, "OFF"
     bpy.ops.fmqm.measure()
     assert scene.fmqm.look.show == "OFF"
+
+
+def test_json_is_saved_without_pillow(scene: bpy.types.Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in [name for name in sys.modules if name.split(".")[0] == "PIL"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "PIL", None)  # type: ignore[arg-type]  importing it fails
+    a, b = scenes.monkey("A", []), scenes.monkey("B", [])
+    scene.fmqm.reference, scene.fmqm.settings.samples, scene.fmqm.settings.patches = a, 1600, 16
+    scene.fmqm.compared.add().object = b
+    bpy.ops.fmqm.measure()
+    path = tmp_path / "scores.json"
+    assert bpy.ops.fmqm.save_results(filepath=str(path), file_format="json") == {"FINISHED"}
+    assert json.loads(path.read_text())["pairs"][0]["FMQM"] == 1
+
+
+def test_help_is_a_file_of_the_extension() -> None:
+    assert preferences._HELP.is_file()
+    assert preferences.FMQMPreferences.bl_idname == "fmqm_addon"

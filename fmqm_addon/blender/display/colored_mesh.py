@@ -20,8 +20,10 @@ from ...metric.colorspace import decode_srgb
 Array = NDArray[Any]
 
 _WIDTH = 1024  # of the texture that holds the colors
-# How much nearer to the viewer it is drawn than the surface that it lies on: in distances, and in steps of the depth.
-_NEARER, _DEPTH_STEPS = 4e-4, 1e-6
+# How much nearer to the viewer it is drawn than the surface that it lies on, in distances: the same one, or one that
+# is shown with other levels of detail than renders have.
+SAME, SIMILAR = 4e-4, 4e-3
+_DEPTH_STEPS = 1e-6
 
 _VERTEX = """
 void main() {
@@ -69,11 +71,11 @@ class ColoredMesh:
         self.colors[:, 3] = shown
         self._table = None
 
-    def draw(self, matrix: Matrix, region_3d: Any) -> None:
+    def draw(self, matrix: Matrix, region_3d: Any, nearer: float = SAME) -> None:
         """Draws it in a 3D view, from a POST_VIEW handler.
 
         Args:
-            matrix: from the vertices to the world. region_3d: of the view.
+            matrix: from the vertices to the world. region_3d: of the view. nearer: to the viewer, in distances.
         """
         if not len(self.colors):
             return
@@ -87,7 +89,7 @@ class ColoredMesh:
         gpu.state.depth_mask_set(True)
         try:
             shader.bind()
-            shader.uniform_float("matrix", _clip_matrix(region_3d) @ region_3d.view_matrix @ matrix)
+            shader.uniform_float("matrix", _clip_matrix(region_3d, nearer) @ region_3d.view_matrix @ matrix)
             shader.uniform_float("towards", _towards(region_3d, matrix))
             shader.uniform_sampler("table", self._table)
             self._batch.draw(shader)
@@ -102,12 +104,12 @@ def from_faces(vertices: Array, triangles: Array, entry: Array) -> ColoredMesh:
     return ColoredMesh(corners, np.arange(len(corners)).reshape(-1, 3), np.repeat(entry, 3))
 
 
-def _clip_matrix(region_3d: Any) -> Matrix:
+def _clip_matrix(region_3d: Any, nearer: float) -> Matrix:
     """From the view to the screen, a little nearer to the viewer."""
-    nearer = Matrix.Scale(1 - _NEARER, 4)
+    moved = Matrix.Scale(1 - nearer, 4)
     if not region_3d.is_perspective:
-        nearer = Matrix.Translation((0.0, 0.0, _NEARER * region_3d.view_distance))
-    clip = region_3d.window_matrix @ nearer
+        moved = Matrix.Translation((0.0, 0.0, nearer * region_3d.view_distance))
+    clip = region_3d.window_matrix @ moved
     clip[2] -= _DEPTH_STEPS * clip[3]
     return clip
 

@@ -17,8 +17,9 @@ from mathutils import Matrix
 from numpy.typing import NDArray
 
 from ...blender.display import viewport
-from ...blender.display.colored_mesh import ColoredMesh, from_faces
+from ...blender.display.colored_mesh import SAME, SIMILAR, ColoredMesh, from_faces
 from ...blender.display.scene_objects import tetrahedra
+from ...blender.scene.triangle_count import triangle_count
 from ...metric.errors import FMQMError
 from ...metric.evaluation import Result
 from ...metric.fields import Fields
@@ -249,7 +250,16 @@ def draw() -> None:
             continue
         if space.local_view is not None and not any(member.local_view_get(space) for member in members):
             continue
-        part.mesh.draw(placed(measured, part.place, members), bpy.context.region_data)
+        nearer = SAME if shown.show == POINTS or _is_as_measured(row, part.place) else SIMILAR
+        part.mesh.draw(placed(measured, part.place, members), bpy.context.region_data, nearer)
+
+
+def _is_as_measured(row: FMQMRow, place: str) -> bool:
+    """Whether as many triangles are shown as were measured: modifiers may have other levels in renders."""
+    target = row_targets(row)[1 if place == LOD else 0]
+    count = triangle_count(target, bpy.context.view_layer.depsgraph)
+    measured = row.triangles if place == LOD else row.triangles * 100 / max(row.share, 1e-9)
+    return count is None or abs(count - measured) <= 0.01 * measured
 
 
 def is_drawn_in(space: Any) -> bool:
