@@ -60,14 +60,12 @@ def measure() -> None:
 
 
 def look() -> None:
-    shown = bpy.context.scene.fmqm.look
-    shown.range, shown.point_size = "FITTED", 1.6
-    bpy.ops.fmqm.look()
+    """Measuring has painted both urns."""
 
 
 def units() -> None:
     shown = bpy.context.scene.fmqm.look
-    shown.range, shown.point_size = "FIXED", 1.0
+    shown.show, shown.range = "POINTS", "FIXED"
     look_from(25, (0.6, 0, 0.7), 4.0)
     bpy.ops.fmqm.unit_step(step=1)
     bpy.ops.fmqm.unit_step(step=UNIT)

@@ -5,12 +5,13 @@ from __future__ import annotations
 
 import bpy
 
-from . import operators, panels, properties, stale
+from . import operators, panels, preferences, properties, stale
 from .operators import measure
+from .panels import swatches
 from .properties import scene
 from .view import updates
 
-CLASSES: tuple[type, ...] = (*properties.CLASSES, *operators.CLASSES, *panels.CLASSES)
+CLASSES: tuple[type, ...] = (*preferences.CLASSES, *properties.CLASSES, *operators.CLASSES, *panels.CLASSES)
 
 
 def register() -> None:
@@ -18,6 +19,7 @@ def register() -> None:
         bpy.utils.register_class(cls)
     scene.register()
     measure.register()
+    swatches.register()
     stale.register()
     updates.register()
 
@@ -26,6 +28,7 @@ def unregister() -> None:
     """The exact mirror of register."""
     updates.unregister()
     stale.unregister()
+    swatches.unregister()
     measure.unregister()
     scene.unregister()
     for cls in reversed(CLASSES):

@@ -20,12 +20,15 @@ class Measured:
         reference_to_world, distorted_to_world: (4, 4) float64; they take positions in scene units,
             `comparison.result.frame.leave(...)`, to where the reference and the compared object stand in
             the world. They differ from the identity where Space moved an object for the measurement.
+        reference_stood, distorted_stood: (4, 4) the world matrix of a single object then; None for several.
     """
 
     reference: Surface
     comparison: Comparison
     reference_to_world: Floats
     distorted_to_world: Floats
+    reference_stood: Floats | None = None
+    distorted_stood: Floats | None = None
 
 
 @dataclass

@@ -19,7 +19,7 @@ from ..comparison.alignment import location_counts
 from . import session
 from .properties.items import item_target, kept
 from .properties.rows import row_targets
-from .view.shown import forget_removed, settle_colors
+from .view.shown import forget_removed
 
 _WATCHED = tuple(
     getattr(bpy.types, name)
@@ -110,7 +110,6 @@ def _on_undo(*_: object) -> None:
     sweep()  # the step may be one of during a measurement
     forget_removed()
     soon()
-    bpy.app.timers.register(settle_colors, first_interval=0)
 
 
 @_kept

@@ -5,12 +5,9 @@ from __future__ import annotations
 
 import pytest
 
-from fmqm_addon.blender.display import viewport
-
 from . import scenes
 
 
 @pytest.fixture(autouse=True)
 def empty_session() -> None:
-    viewport.restore_colors()  # an empty session keeps the window's views
     scenes.clear()

@@ -126,11 +126,11 @@ def test_find_lods_without_any(fmqm: FMQMScene) -> None:
 
 
 def test_reasons_for_a_grey_button(fmqm: FMQMScene, lods: list[bpy.types.Object]) -> None:
-    assert "Choose a reference" in why_not()
+    assert "Choose the original" in why_not()
     fmqm.reference = lods[0]
-    assert "Add an object" in why_not()
+    assert "Add an LOD" in why_not()
     compare(lods[0], lods[0])
-    assert "Rock_LOD0 is the reference and in the list too" in why_not()
+    assert "Rock_LOD0 is the original and in the list too" in why_not()
 
 
 def test_settings_that_contradict(fmqm: FMQMScene, lods: list[bpy.types.Object]) -> None:
@@ -492,10 +492,10 @@ def test_deleted_objects_are_gone_and_let_go_of(fmqm: FMQMScene, lods: list[bpy.
     assert stale_names(fmqm) == {"Rock_LOD2"}
     select(lods[1])
     bpy.ops.object.delete()
-    assert why_not().endswith("Add an object to compare with the reference")
+    assert why_not().endswith("Add an LOD to compare with the original")
     select(lods[0])
     bpy.ops.object.delete()
-    assert why_not().endswith("Rock_LOD0 is gone; choose another reference")
+    assert why_not().endswith("Rock_LOD0 is gone; choose another original")
     stale.forget_deleted(bpy.context.scene)
     assert fmqm.reference is None and [item.object for item in fmqm.compared] == [None, None]
     assert [item.name for item in fmqm.compared] == ["Rock_LOD1", "Rock_LOD2"]
@@ -615,7 +615,7 @@ def test_arrays_go_with_their_row(fmqm: FMQMScene, lods: list[bpy.types.Object],
     compare(lods[0], *lods[1:])
     bpy.ops.fmqm.measure()
     fmqm.row_index = 0
-    for act in (bpy.ops.fmqm.look, bpy.ops.fmqm.paint_surface, bpy.ops.fmqm.unit_step):
+    for act in (bpy.ops.fmqm.keep, bpy.ops.fmqm.slice, bpy.ops.fmqm.unit_step):
         act()
     held = remembered(fmqm)
     remove(fmqm)
@@ -655,7 +655,7 @@ def test_rows_at_other_settings_are_told_apart(fmqm: FMQMScene, lods: list[bpy.t
         outcome = measure.Outcome(target_of(lods[0]), target_of(lod))
         measuring._write_row(fmqm, outcome, json.dumps(metric_settings(fmqm.settings).as_dict()))
         rows.append(fmqm.rows[len(rows)])
-    assert [settings_name(row) for row in rows] == ["Fast", "Fast", "Custom"]
+    assert [settings_name(row) for row in rows] == ["Quick", "Quick", "Custom"]
     assert comparable(rows[0], rows[1]) and not comparable(rows[1], rows[2])
 
 

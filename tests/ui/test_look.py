@@ -14,22 +14,26 @@ import numpy as np
 import pytest
 
 import fmqm_addon
-from fmqm_addon.blender.display import scene_objects, viewport
+from fmqm_addon.blender.display import scene_objects
 from fmqm_addon.blender.scene.bvh import BVHQuery
 from fmqm_addon.blender.scene.mesh_arrays import mesh_arrays
 from fmqm_addon.comparison.measurement import Comparison, Measurement
-from fmqm_addon.metric.colorspace import decode_srgb, srgb_to_lab
+from fmqm_addon.metric.colorspace import srgb_to_lab
 from fmqm_addon.metric.evaluation import Result, Scores
 from fmqm_addon.metric.fields import Fields
 from fmqm_addon.metric.geometry import dot
 from fmqm_addon.metric.sampling import Samples
 from fmqm_addon.metric.settings import Settings
+from fmqm_addon.metric.surface import triangle_areas
 from fmqm_addon.report.visual import colormap, layers
+from fmqm_addon.report.visual.heat_map import UNCOVERED
 from fmqm_addon.report.visual.shells import SHELLS, fields_at, shell_points, slice_points
 from fmqm_addon.report.visual.units import unit_grid, unit_of
 from fmqm_addon.report.visual.worst import worst_patches
 from fmqm_addon.ui import session
-from fmqm_addon.ui.view import cloud, overlay, shown, slice_plane
+from fmqm_addon.ui.properties.items import is_asset
+from fmqm_addon.ui.view import heat, overlay, slice_plane
+from fmqm_addon.ui.view import shells as shell_view
 from fmqm_addon.ui.view.result import measured_row
 from tests.blender import scenes
 
@@ -73,16 +77,32 @@ def by_hand() -> tuple[Fields, Fields]:
     return ref, dataclasses.replace(ref, sdf=np.array([1.0, -1.5, -2, 2]), ncf=ncf)
 
 
+def drawn() -> heat.Shown:
+    found = heat.shown_in(bpy.context.scene)
+    assert found is not None
+    return found
+
+
 def legend() -> dict:
-    return json.loads(scene_objects.find_object(bpy.context.scene, scene_objects.CLOUD)[overlay.LEGEND])
+    return drawn().legend
 
 
-def point_colors(kind: str = scene_objects.CLOUD) -> np.ndarray:
-    """(N, 3) linear, of the first corner of each point."""
-    mesh = scene_objects.find_object(bpy.context.scene, kind).data
-    values = np.empty(4 * len(mesh.vertices), np.float32)
-    mesh.attributes[scene_objects.COLOR].data.foreach_get("color", values)
-    return values.reshape(-1, 4)[:: 4 if kind == scene_objects.CLOUD else 1, :3]
+def point_colors(part: int = 0) -> np.ndarray:
+    """(N, 3) encoded, of each point or triangle."""
+    return drawn().parts[part].mesh.colors[:, :3]
+
+
+def seen(part: int = 0) -> np.ndarray:
+    """(N,) which points or triangles are drawn."""
+    return drawn().parts[part].mesh.colors[:, 3] > 0
+
+
+def show_points() -> None:
+    bpy.context.scene.fmqm.look.show = "POINTS"
+
+
+def show_surface() -> None:
+    bpy.context.scene.fmqm.look.show = "SURFACE"
 
 
 # --- Values and colors
@@ -131,9 +151,9 @@ def test_neighbors_in_number_differ() -> None:
 def test_ranges() -> None:
     values = np.array([0.4, 0.8])
     assert layers.value_range("FMQM", values, False, 10.0) == (0, 1)
-    assert layers.value_range("FMQM", values, True, 10.0) == (0.4, 0.8)
+    assert layers.value_range("FMQM", values, True, 10.0) == (0.4, 1)
     low, high = layers.value_range("FMQM", np.ones(5), True, 10.0)
-    assert low < high == 1
+    assert 0.99 < low < high == 1
     assert layers.value_range("SDF_DIFFERENCE", values, False, 10.0) == pytest.approx((0, 0.1))
     low, high = layers.value_range("SDF_REFERENCE", np.array([-5.0, 1]), True, 10.0)
     assert low == -high and 4 < high <= 5
@@ -143,7 +163,7 @@ def test_ranges() -> None:
 def test_legend_tells_its_numbers(measured: session.Measured) -> None:
     result = measured.comparison.result
     of_scores = layers.legend("geoSSIM", (0.95, 0.97), "LOD1", result)
-    assert [text for _, text in of_scores.ticks] == ["0.9500", "0.9550", "0.9600", "0.9650", "0.9700"]
+    assert [text for _, text in of_scores.ticks] == ["0.950", "0.955", "0.960", "0.965", "0.970"]
     assert of_scores.mark is not None and of_scores.mark[1] == f"{result.scores[0]:.4f}"
     of_lengths = layers.legend("SDF_REFERENCE", (-2, 2), "LOD1", result, lambda value: f"{value} m")
     assert of_lengths.ticks[-1] == (1.0, "2.0 m") and of_lengths.mark is None
@@ -155,25 +175,15 @@ def test_worst_patches_name_who_is_to_blame(measured: session.Measured) -> None:
     scores[:, 3] = 0.4  # low everywhere: nothing special
     scores[2] = [0.9, 0.45, 0.9, 0.4, 0.3]
     scores[0] = [0.9, 0.9, 0.9, 0.1, 0.2]
-    result = dataclasses.replace(measured.comparison.result, patch_scores=scores, scores=Scores(*scores.mean(axis=0)))
+    result = dataclasses.replace(
+        measured.comparison.result, patch_scores=scores, patch_perceived=scores, scores=Scores(*scores.mean(axis=0))
+    )
     worst = worst_patches(result, 3)
-    assert [(w.patch, w.blame, w.value) for w in worst[:2]] == [(0, "colorGraSSIM", 0.1), (2, "geoGraSSIM", 0.45)]
+    assert [(w.patch, w.blame, w.value) for w in worst[:2]] == [(0, "detail", 0.1), (2, "detail", 0.4)]
     assert [w.patch for w in worst] == [0, 2, 1]
 
 
 # --- Probes
-
-
-def test_painted_scores_lie_between_those_of_the_patches(measured: session.Measured) -> None:
-    result = measured.comparison.result
-    values = layers.blended_scores(result, "FMQM")
-    scores = result.patch_scores[:, 4]
-    assert len(values) == len(result.patch_mesh.vertices)
-    assert scores.min() <= values.min() and values.max() <= scores.max() and values.std() > 0
-    alike = dataclasses.replace(result, patch_scores=np.full_like(result.patch_scores, 0.7))
-    assert layers.blended_scores(alike, "FMQM") == pytest.approx(0.7)
-    numbers = layers.blended_scores(result, "PATCH")
-    assert numbers[[patch.center for patch in result.patches]].tolist() == list(range(len(result.patches)))
 
 
 def test_shells_stand_at_their_distances(measured: session.Measured) -> None:
@@ -212,78 +222,210 @@ def test_slice_points_are_the_centers_of_pixels() -> None:
 # --- In the scene
 
 
-def test_cloud_is_at_the_reference_or_the_compared(scene: bpy.types.Scene, measured: session.Measured) -> None:
-    bpy.ops.fmqm.look()
-    cloud = scene_objects.find_object(bpy.context.scene, scene_objects.CLOUD)
+def test_points_are_at_the_original_and_at_the_lod(scene: bpy.types.Scene, measured: session.Measured) -> None:
+    show_points()
+    assert [part.place for part in drawn().parts] == [heat.ORIGINAL, heat.LOD]
     result = measured.comparison.result
-    world = result.frame.leave(result.samples.positions)
-
-    def center_of_first() -> np.ndarray:
-        bpy.context.view_layer.update()
-        corners = [np.array(cloud.matrix_world @ cloud.data.vertices[k].co) for k in range(4)]
-        return np.mean(corners, axis=0)
-
-    assert center_of_first() == pytest.approx(world[0], abs=1e-5)
+    corners = drawn().parts[0].mesh.vertices.reshape(-1, 4, 3)
+    assert corners.mean(axis=1) == pytest.approx(result.samples.positions, abs=1e-6)
+    at = [np.array(heat.placed(measured, part.place, [])) for part in drawn().parts]
+    assert at[0][:3, :3] * result.frame.scale**0 == pytest.approx(np.eye(3) * result.frame.scale)
+    assert at[1][:3, 3] - at[0][:3, 3] == pytest.approx([10, 0, 0], abs=1e-5)
     scene.fmqm.look.place = "COMPARED"
-    assert center_of_first() == pytest.approx(world[0] + (10, 0, 0), abs=1e-5)
+    assert [part.place for part in drawn().parts] == [heat.LOD]
 
 
-def test_every_layer_shows_and_adds_nothing(scene: bpy.types.Scene, measured: session.Measured) -> None:
-    bpy.ops.fmqm.look()
-    before, look = scenes.blocks(), scene.fmqm.look
-    seen = []
-    for name, layer in layers.LAYERS.items():
-        for look.range in ("FIXED", "FITTED"):
-            look.layer = name
-            assert legend()["title"].startswith(layer.label)
-        seen.append(point_colors())
-    assert scenes.blocks() == before
-    assert all((a != b).any() for a, b in zip(seen[:-1], seen[1:], strict=True))
+def test_surfaces_are_painted_by_the_nearest_patch(scene: bpy.types.Scene, measured: session.Measured) -> None:
+    show_surface()
+    result = measured.comparison.result
+    for part, surface in zip(drawn().parts, (measured.reference, measured.comparison.distorted), strict=True):
+        mesh = part.heat_mesh
+        assert triangle_areas(mesh.vertices, mesh.triangles).sum() == pytest.approx(
+            triangle_areas(surface.vertices, surface.triangles).sum()
+        )
+        away = np.linalg.norm(mesh.centers[:, None] - result.patch_centers, axis=2)
+        assert (away[np.arange(len(away)), part.patch] <= away.min(axis=1) + 1e-5).all()
+    scores = result.of_patches("FMQM")[drawn().parts[1].patch]
+    assert point_colors(1) == pytest.approx(layers.layer_colors("FMQM", scores, *drawn().ends), abs=1e-6)
+
+
+def test_colors_go_along_with_an_object(scene: bpy.types.Scene, measured: session.Measured) -> None:
+    """Its transform may change without the result: LODs are put side by side."""
+    mine = scenes.cube()
+    mine.location.x = 3
+    bpy.context.view_layer.update()
+    stood = dataclasses.replace(measured, distorted_stood=np.array(mine.matrix_world))
+    mine.location.x = 5
+    bpy.context.view_layer.update()
+    before = np.array(heat.placed(measured, heat.LOD, [mine]))
+    assert np.array(heat.placed(stood, heat.LOD, [mine]))[:3, 3] - before[:3, 3] == pytest.approx([2, 0, 0], abs=1e-5)
+
+
+def test_nothing_is_in_the_file(scene: bpy.types.Scene, tmp_path: Path) -> None:
+    mine = scenes.cube()
+    bpy.ops.fmqm.worst_step()
+    bpy.ops.fmqm.clear()  # the list of the worst places stays
+    before = scenes.blocks()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "before.blend"), copy=True)
+    for scene.fmqm.look.show in ("SURFACE", "POINTS"):
+        for name in layers.LAYERS:
+            scene.fmqm.look.layer = name
+        bpy.ops.fmqm.worst_step()
+        bpy.ops.fmqm.shells()
+        bpy.ops.fmqm.unit_step()
+        assert scenes.blocks() == before and mine.select_get() == (mine in bpy.context.selected_objects)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "after.blend"), copy=True)
+    sizes = [(tmp_path / name).stat().st_size for name in ("before.blend", "after.blend")]
+    assert abs(sizes[1] - sizes[0]) < 1000
+
+
+def test_what_has_changed_is_not_painted(scene: bpy.types.Scene) -> None:
+    show_surface()
+    assert heat.is_current(scene)
+    session.stale["row"] = "changed"
+    assert heat.shown_in(scene) is None and not heat.is_current(scene)
+    heat.build_all()
+    assert heat.is_current(scene)
+    del session.stale["row"]
+    heat.build_all()
+    assert heat.shown_in(scene) is not None
+
+
+def test_every_layer_shows(scene: bpy.types.Scene, measured: session.Measured) -> None:
+    look = scene.fmqm.look
+    for show in (show_points, show_surface):
+        show()
+        colors = []
+        for name, layer in layers.LAYERS.items():
+            for look.range in ("FIXED", "FITTED"):
+                look.layer = name
+                assert legend()["title"].startswith(layer.label)
+            colors.append(point_colors(1))
+        assert all((a != b).any() for a, b in zip(colors[:-1], colors[1:], strict=True))
+    show_points()
     look.layer = "NCF_REFERENCE"
-    assert point_colors() == pytest.approx(decode_srgb(measured.comparison.result.ref.ncf), abs=1e-5)
+    assert point_colors() == pytest.approx(measured.comparison.result.ref.ncf, abs=1e-5)
 
 
-def test_looking_again_replaces_and_clear_takes_all(scene: bpy.types.Scene) -> None:
+def test_only_what_is_below_is_shown(scene: bpy.types.Scene, measured: session.Measured) -> None:
+    scores = measured.comparison.result.of_patches("FMQM")
+    look, middle = scene.fmqm.look, float(np.median(scores))
+    for show in (show_points, show_surface):
+        show()
+        look.only_below, look.below = True, middle
+        for part, _ in enumerate(drawn().parts):
+            assert (seen(part) == (scores < look.below)[drawn().parts[part].patch]).all() and seen(part).any()
+        look.only_below = False
+        assert seen().all()
+
+
+def test_ends_of_ones_own(scene: bpy.types.Scene, measured: session.Measured) -> None:
+    show_surface()
+    scene.fmqm.look.low, scene.fmqm.look.high, scene.fmqm.look.range = 0.25, 0.75, "CUSTOM"
+    assert drawn().ends == pytest.approx((0.25, 0.75))
+    scene.fmqm.look.low = 0.9  # beyond the other
+    low, high = drawn().ends
+    assert low < high
+
+
+def test_the_legend_counts_all_patches(scene: bpy.types.Scene) -> None:
+    show_surface()
+    assert max(legend()["histogram"]) == 1.0
+    scene.fmqm.look.layer = "NCF_REFERENCE"
+    assert "histogram" not in legend()
+
+
+def test_quick_results_do_not_paint_the_rest(scene: bpy.types.Scene, measured: session.Measured) -> None:
+    few = 3
+    old = measured.comparison.result
+    inside = old.samples.patch < few
+    samples = dataclasses.replace(
+        old.samples,
+        positions=old.samples.positions[inside],
+        patch=old.samples.patch[inside],
+        start=old.samples.start[: few + 1],
+    )
+    ref, dist = (
+        dataclasses.replace(each, nearest=each.nearest[inside], sdf=each.sdf[inside], ncf=each.ncf[inside])
+        for each in (old.ref, old.dist)
+    )
+    result = dataclasses.replace(
+        old, patches=old.patches[:few], ref=ref, dist=dist, patch_centers=old.patch_centers[:few], samples=samples,
+        patch_scores=old.patch_scores[:few], patch_perceived=old.patch_perceived[:few],
+    )  # fmt: skip
+    session.put(
+        "row", dataclasses.replace(measured, comparison=dataclasses.replace(measured.comparison, result=result))
+    )
+    show_surface()
+    original = drawn().parts[0]
+    mesh = original.heat_mesh
+    areas = triangle_areas(mesh.vertices, mesh.triangles)
+    covered = areas[original.patch != UNCOVERED].sum() / areas.sum()
+    share = sum(patch.area for patch in result.patches) / areas.sum()
+    assert 0.9 * share < covered < 2 * share < 0.8
+    assert np.abs(point_colors()[original.patch == UNCOVERED] - colormap.NO_PATCH).max() < 1e-6
+    assert legend()["note"] == "grey: not among the 3 patches"
+
+
+def test_a_fitted_range_holds_for_all_rows(scene: bpy.types.Scene, measured: session.Measured) -> None:
+    show_surface()
+    alone = drawn().ends
+    worse = dataclasses.replace(
+        measured.comparison,
+        result=dataclasses.replace(
+            measured.comparison.result, patch_scores=measured.comparison.result.patch_scores * 0.5
+        ),
+    )
+    row = scene.fmqm.rows.add()
+    row.uid = row.name = "Worse"
+    session.put("Worse", dataclasses.replace(measured, comparison=worse))
+    heat.refresh(scene)
+    assert drawn().ends[0] < alone[0] and drawn().ends[1] == alone[1] == 1.0
+    scene.fmqm.row_index = 1
+    assert drawn().uid == "Worse"
+    both = drawn().ends
+    scene.fmqm.row_index = 0
+    assert drawn().ends == both
+
+
+def test_kept_objects_replace_those_before_and_clear_takes_all(scene: bpy.types.Scene) -> None:
     mine = scenes.cube()
     mine.select_set(True)
     bpy.context.view_layer.objects.active = mine
-    before = scenes.blocks()
-    shading = [
-        (space.shading.color_type, space.shading.studio_light)
-        for screen in bpy.data.screens
-        for area in screen.areas
-        for space in area.spaces
-        if space.type == "VIEW_3D"
-    ]
-    acts = (bpy.ops.fmqm.look, bpy.ops.fmqm.paint_surface, bpy.ops.fmqm.shells, bpy.ops.fmqm.slice)
-    for act in (*acts, bpy.ops.fmqm.worst_step, bpy.ops.fmqm.unit_step):
-        assert act() == {"FINISHED"}
+    before, looks = scenes.blocks(), shadings()
+    assert not bpy.ops.fmqm.keep.poll()
+    for show in (show_points, show_surface):
+        show()
+        assert bpy.ops.fmqm.keep() == {"FINISHED"}
+    bpy.ops.fmqm.slice()
     once = scenes.blocks()
-    assert once > before
-    for act in acts:
-        act()
-    assert scenes.blocks() == once and not any(name.endswith(".001") for _, name in once - before)
-    assert bpy.context.selected_objects == [mine] and bpy.context.object == mine
+    assert once > before and len(list(scene_objects.objects(scene))) == 5
+    for show in (show_points, show_surface):
+        show()
+        bpy.ops.fmqm.keep()
+    bpy.ops.fmqm.slice()
+    assert scenes.blocks() == once and bpy.context.object == mine
+    assert not any(is_asset(object_) for object_ in scene_objects.objects(scene))
+    assert shadings() == looks
 
     assert bpy.ops.fmqm.clear() == {"FINISHED"}
-    assert scenes.blocks() == before
-    assert shading == [
-        (space.shading.color_type, space.shading.studio_light)
-        for screen in bpy.data.screens
-        for area in screen.areas
-        for space in area.spaces
-        if space.type == "VIEW_3D"
-    ]
+    assert scenes.blocks() == before and shadings() == looks
     assert bpy.context.selected_objects == [mine] and bpy.context.object == mine
-    assert len(scene.fmqm.rows) == 1 and overlay.figure is None
+    assert len(scene.fmqm.rows) == 1 and overlay.figure is None and heat.shown_in(scene) is None
     assert not bpy.ops.fmqm.clear.poll()
+
+
+def shadings() -> list[tuple[str, str]]:
+    views = (s for screen in bpy.data.screens for a in screen.areas for s in a.spaces if s.type == "VIEW_3D")
+    return [(view.shading.color_type, view.shading.studio_light) for view in views]
 
 
 def test_works_in_edit_mode_and_leaves_it_alone(scene: bpy.types.Scene) -> None:
     mine = scenes.cube()
     bpy.context.view_layer.objects.active = mine
     bpy.ops.object.mode_set(mode="EDIT")
-    bpy.ops.fmqm.look()
+    show_points()
+    bpy.ops.fmqm.keep()
     bpy.ops.fmqm.clear()
     assert mine.mode == "EDIT"
     bpy.ops.object.mode_set(mode="OBJECT")
@@ -292,26 +434,23 @@ def test_works_in_edit_mode_and_leaves_it_alone(scene: bpy.types.Scene) -> None:
 def test_worst_places_show_only_their_patch(scene: bpy.types.Scene, measured: session.Measured) -> None:
     look, result = scene.fmqm.look, measured.comparison.result
 
-    def shown() -> set[int]:
-        mesh = scene_objects.find_object(bpy.context.scene, scene_objects.CLOUD).data
-        values = np.empty(3 * len(mesh.vertices), np.float32)
-        mesh.vertices.foreach_get("co", values)
-        corners = values.reshape(-1, 4, 3)
-        return set(result.samples.patch[(corners[:, 0] != corners[:, 1]).any(axis=1)].tolist())
+    def patches() -> set[int]:
+        return set(drawn().parts[0].patch[seen()].tolist())
 
     order = np.argsort(result.patch_scores[:, 4], kind="stable").tolist()
     bpy.ops.fmqm.worst_step(step=1)
-    assert shown() == {order[0]} and [item.patch for item in look.worst] == order
+    assert look.show == "SURFACE" and patches() == {order[0]} and [item.patch for item in look.worst] == order
     bpy.ops.fmqm.worst_step(step=1)
-    assert shown() == {order[1]} and look.worst_index == 1
+    assert patches() == {order[1]} and look.worst_index == 1
+    show_points()
     look.point_size = 2.0
-    assert shown() == {order[1]}
+    assert patches() == {order[1]}
     bpy.ops.fmqm.worst_step(step=-1)
-    assert shown() == {order[0]}
+    assert patches() == {order[0]}
     look.worst_index = 3  # a click in the list
-    assert shown() == {order[3]}
+    assert patches() == {order[3]}
     bpy.ops.fmqm.worst_all()
-    assert shown() == set(order)
+    assert patches() == set(order)
 
 
 def test_slice_shows_the_field_where_it_is(scene: bpy.types.Scene, measured: session.Measured) -> None:
@@ -319,6 +458,7 @@ def test_slice_shows_the_field_where_it_is(scene: bpy.types.Scene, measured: ses
     look.slice_layer, look.slice_resolution = "NCF_REFERENCE", "128"
     bpy.ops.fmqm.slice()
     plane = scene_objects.find_object(bpy.context.scene, scene_objects.SLICE)
+    assert plane.hide_render
 
     def pixels() -> np.ndarray:
         values = np.empty(128 * 128 * 4, np.float32)
@@ -337,19 +477,10 @@ def test_slice_shows_the_field_where_it_is(scene: bpy.types.Scene, measured: ses
     assert not slice_plane.slice_has_moved(scene) and (pixels() != first).any()
 
 
-def test_cloud_follows_the_chosen_row(scene: bpy.types.Scene, measured: session.Measured) -> None:
-    bpy.ops.fmqm.look()
-    row = scene.fmqm.rows.add()
-    row.uid, row.name = "other", "Other"
-    session.put("other", dataclasses.replace(measured, comparison=many(measured.comparison, 50)))
-    before = len(scenes.blocks())
-    scene.fmqm.row_index = 1
-    scene.fmqm.look.layer = "PATCH"
-    assert len(point_colors()) == 50 and len(scenes.blocks()) == before
-
-
-def subtitle(kind: str) -> str:
-    return str(json.loads(scene_objects.find_object(bpy.context.scene, kind)[overlay.LEGEND])["subtitle"])
+def subtitle() -> str:
+    return str(
+        json.loads(scene_objects.find_object(bpy.context.scene, scene_objects.SLICE)[overlay.LEGEND])["subtitle"]
+    )
 
 
 def add_row(scene: bpy.types.Scene, measured: session.Measured, name: str) -> None:
@@ -362,11 +493,9 @@ def add_row(scene: bpy.types.Scene, measured: session.Measured, name: str) -> No
     session.put(name, dataclasses.replace(measured, comparison=comparison))
 
 
-SHOWN = (scene_objects.CLOUD, scene_objects.PAINTED, scene_objects.SHELLS, scene_objects.SLICE)
-
-
 def show_all() -> None:
-    for act in (bpy.ops.fmqm.look, bpy.ops.fmqm.paint_surface, bpy.ops.fmqm.shells, bpy.ops.fmqm.slice):
+    show_points()
+    for act in (bpy.ops.fmqm.shells, bpy.ops.fmqm.slice):
         act()
 
 
@@ -376,31 +505,32 @@ def test_all_follows_the_chosen_row(scene: bpy.types.Scene, measured: session.Me
     bpy.ops.fmqm.unit_step()
     add_row(scene, measured, "Other")
     scene.fmqm.row_index = 1
-    legends = [scene_objects.find_object(scene, kind)[overlay.LEGEND] for kind in SHOWN]
-    assert all("Other" in text and "Monkey_LOD1" not in text for text in legends)
+    titles = [legend()["subtitle"], subtitle(), shells_of(scene).legend["title"]]
+    assert all("Other" in text for text in titles)
     assert overlay.figure is not None and overlay.figure.uid == "Other"
     scene.fmqm.rows.add().error = "broken"
     scene.fmqm.row_index = 2  # nothing to follow
-    assert legends == [scene_objects.find_object(scene, kind)[overlay.LEGEND] for kind in SHOWN]
+    assert heat.shown_in(scene) is None and subtitle() == "Other"
+
+
+def shells_of(scene: bpy.types.Scene) -> shell_view.Shells:
+    return shell_view.shown[scene.name]
 
 
 def test_all_but_the_slice_follows_the_place(scene: bpy.types.Scene) -> None:
     show_all()
     bpy.ops.fmqm.unit_step()
-    lines = overlay.figure.lines
-
-    def places() -> np.ndarray:
-        return np.array([scene_objects.find_object(scene, kind).location.x for kind in SHOWN])
-
-    before = places()
+    lines, plane = overlay.figure.lines, scene_objects.find_object(scene, scene_objects.SLICE)
+    before = shells_of(scene).matrix.translation.x, plane.location.x
     scene.fmqm.look.place = "COMPARED"
-    assert places() - before == pytest.approx([10, 10, 10, 0], abs=1e-5)
+    after = shells_of(scene).matrix.translation.x, plane.location.x
+    assert np.subtract(after, before) == pytest.approx([10, 0], abs=1e-5)
     assert overlay.figure.lines == pytest.approx(lines + (10, 0, 0))
 
 
 def test_worst_places_are_the_chosen_rows(scene: bpy.types.Scene, measured: session.Measured) -> None:
     look = scene.fmqm.look
-    bpy.ops.fmqm.look()
+    show_points()
     bpy.ops.fmqm.clear()
     add_row(scene, measured, "Other")
     scene.fmqm.rows.add().error = "broken"
@@ -409,42 +539,27 @@ def test_worst_places_are_the_chosen_rows(scene: bpy.types.Scene, measured: sess
     look.worst_index = 3  # a click in the list
     assert look.worst_index == 3 and look.focused
     scene.fmqm.row_index = 2
-    assert not len(look.worst)
-    bpy.ops.fmqm.worst_all()  # still there for the points that are shown
-    assert not look.focused
-
-
-def test_worst_places_are_the_judges(scene: bpy.types.Scene, measured: session.Measured) -> None:
-    look, result = scene.fmqm.look, measured.comparison.result
-    bpy.ops.fmqm.look()
-    look.worst_index = 2  # a click in the list
-    for judge, column in (("PERCEIVED", "perceived"), ("FMQM", "FMQM")):
-        scene.fmqm.judge = judge
-        lowest = np.sort(result.of_patches(column))[: len(look.worst)]
-        np.testing.assert_allclose([item.score for item in look.worst], lowest, rtol=1e-6)
-        assert look.layer == column and not look.focused and look.worst_index == 0
-    look.layer = "SIDES"
-    scene.fmqm.judge = "PERCEIVED"
-    assert look.layer == "SIDES", "only a score gives way to a score"
+    assert not len(look.worst) and not look.focused
 
 
 def test_each_scene_shows_its_own(scene: bpy.types.Scene, measured: session.Measured) -> None:
     show_all()
-    mine = [scene_objects.find_object(scene, kind) for kind in SHOWN]
+    mine = scene_objects.find_object(scene, scene_objects.SLICE)
     two = bpy.data.scenes.new("Two")
     add_row(two, measured, "Other")
-    cloud.show_cloud(two)
+    two.fmqm.look.show = "POINTS"
     slice_plane.show_slice(two)
-    assert [scene_objects.find_object(scene, kind) for kind in SHOWN] == mine and subtitle(SHOWN[0]) == "Monkey_LOD1"
-    theirs = list(scene_objects.objects(two))
-    assert len(theirs) == 2 and not set(theirs) & set(mine)
-    assert all(len(shown.users_scene) == 1 for shown in (*mine, *theirs))
+    assert scene_objects.find_object(scene, scene_objects.SLICE) == mine and subtitle() == "Monkey_LOD1"
+    assert drawn().uid == "row" and heat.shown_in(two).uid == "Other"
+    (theirs,) = scene_objects.objects(two)
+    assert theirs != mine and len(theirs.users_scene) == len(mine.users_scene) == 1
     bpy.ops.fmqm.clear()
-    assert not scene_objects.anything()
+    assert not scene_objects.anything() and heat.shown_in(two) is None
 
 
 def test_what_was_hidden_is_shown_when_asked_for(scene: bpy.types.Scene) -> None:
-    bpy.ops.fmqm.look()
+    show_points()
+    bpy.ops.fmqm.keep()
     cloud = scene_objects.find_object(scene, scene_objects.CLOUD)
     (collection,) = cloud.users_collection
 
@@ -468,11 +583,8 @@ def test_what_was_hidden_is_shown_when_asked_for(scene: bpy.types.Scene) -> None
         assert not cloud.visible_get()
         scene.fmqm.row_index = 0  # following is not asking
         assert not cloud.visible_get()
-        bpy.ops.fmqm.look()
+        bpy.ops.fmqm.keep()
         assert cloud.visible_get(), hide
-    cloud.hide_set(True)
-    bpy.ops.fmqm.worst_step()
-    assert cloud.visible_get()
 
 
 def test_slice_is_in_the_saved_file(scene: bpy.types.Scene, tmp_path: Path) -> None:
@@ -496,38 +608,19 @@ def test_slice_is_in_the_saved_file(scene: bpy.types.Scene, tmp_path: Path) -> N
 
 def test_lengths_of_the_shells_have_the_scenes_unit(scene: bpy.types.Scene) -> None:
     bpy.ops.fmqm.shells()
-    assert subtitle(scene_objects.SHELLS).endswith(" cm apart")
+    assert shells_of(scene).legend["subtitle"].endswith(" cm apart")
     scene.unit_settings.system = "NONE"
     bpy.ops.fmqm.shells()
-    assert float(subtitle(scene_objects.SHELLS).removesuffix(" apart")) > 0
-
-
-def test_undo_takes_the_views_colors_along(scene: bpy.types.Scene) -> None:
-    """Undo and redo change the file but not the views; the window calls this after them."""
-    view = next(s for screen in bpy.data.screens for a in screen.areas for s in a.spaces if s.type == "VIEW_3D")
-    before = view.shading.color_type
-    bpy.ops.fmqm.slice()
-    shown.settle_colors()
-    assert view.shading.color_type == before  # a slice needs no other colors
-    bpy.ops.fmqm.look()
-    view.shading.color_type = "RANDOM"
-    shown.settle_colors()
-    assert view.shading.color_type == "RANDOM"  # the user's choice
-    view.shading.color_type = "VERTEX"
-    scene_objects.clear()  # as undo would
-    shown.settle_colors()
-    assert view.shading.color_type == before and not viewport.colors_changed()
-    cloud.show_cloud(scene)
-    viewport.restore_colors()
-    shown.settle_colors()  # after redo
-    assert view.shading.color_type == "VERTEX"
+    assert float(shells_of(scene).legend["subtitle"].removesuffix(" apart")) > 0
 
 
 def test_figure_goes_with_its_row(scene: bpy.types.Scene) -> None:
     bpy.ops.fmqm.unit_step()
+    show_points()
     assert overlay.figure is not None and overlay.belongs_here(overlay.figure)
     scene.fmqm.rows.clear()  # as undo past the measurement would, which leaves the session alone
     assert session.get("row") is not None and not overlay.belongs_here(overlay.figure)
+    assert heat.shown_in(scene) is None
 
 
 def test_switched_off_it_leaves_nothing(scene: bpy.types.Scene) -> None:
@@ -535,19 +628,18 @@ def test_switched_off_it_leaves_nothing(scene: bpy.types.Scene) -> None:
     bpy.ops.fmqm.worst_step()
     fmqm_addon.unregister()
     try:
-        assert not scene_objects.anything() and not viewport.colors_changed() and overlay.figure is None
+        assert not scene_objects.anything() and overlay.figure is None
     finally:
         fmqm_addon.register()
-    assert not bpy.context.scene.fmqm.look.focused
+    assert not bpy.context.scene.fmqm.look.focused and bpy.context.scene.fmqm.look.show == "OFF"
 
 
 def test_without_samples_it_says_measure_again(scene: bpy.types.Scene) -> None:
-    bpy.ops.fmqm.look()
-    before = point_colors()
+    show_points()
     session.clear()
     scene.fmqm.look.layer = "PATCH"  # no error: there is nobody to tell
-    assert (point_colors() == before).all()
-    assert not bpy.ops.fmqm.look.poll() and not bpy.ops.fmqm.slice.poll()
+    assert heat.shown_in(scene) is None
+    assert not bpy.ops.fmqm.keep.poll() and not bpy.ops.fmqm.slice.poll()
     with pytest.raises(fmqm_addon.metric.errors.FMQMError, match="press Measure Quality again"):
         measured_row(scene)
     assert bpy.ops.fmqm.clear() == {"FINISHED"}
@@ -556,18 +648,13 @@ def test_without_samples_it_says_measure_again(scene: bpy.types.Scene) -> None:
 def test_switching_layers_of_many_samples_is_quick(scene: bpy.types.Scene, measured: session.Measured) -> None:
     session.put("row", dataclasses.replace(measured, comparison=many(measured.comparison, 200_000)))
     began = time.perf_counter()
-    bpy.ops.fmqm.look()
+    show_points()
     print(f"built in {time.perf_counter() - began:.3f} s")
-    worst = 0.0
     for name in reversed(layers.LAYERS):
         began = time.perf_counter()
         scene.fmqm.look.layer = name
-        worst = max(worst, time.perf_counter() - began)
         print(f"{name} in {time.perf_counter() - began:.3f} s")
-    began = time.perf_counter()
-    scene.fmqm.look.point_size = 1.5
-    print(f"resized in {time.perf_counter() - began:.3f} s")
-    assert worst < 0.2
+        assert len(point_colors()) == 200_000
 
 
 def many(comparison: Comparison, count: int) -> Comparison:

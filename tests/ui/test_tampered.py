@@ -119,6 +119,7 @@ def test_a_broken_legend_is_none() -> None:
 def test_an_object_with_a_broken_legend_draws_none(
     rows: bpy.types.bpy_prop_collection, value: object, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    bpy.context.scene.fmqm.look.show = "OFF"
     tagged = bpy.data.objects["Rock_LOD1"]
     tagged[overlay.LEGEND] = value
     monkeypatch.setattr(overlay.scene_objects, "objects", lambda scene: [tagged])

@@ -8,6 +8,7 @@ names gives shot(name) and done().
 from __future__ import annotations
 
 import builtins
+import hashlib
 import json
 import os
 import sys
@@ -18,6 +19,8 @@ from types import ModuleType
 
 import bpy
 import numpy as np
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+from mathutils import Vector
 
 DRAWN = 6  # seconds until a change is on the screen, drawn by software
 OUT = Path(os.environ["FMQM_OUT"])
@@ -60,6 +63,7 @@ def build() -> None:
     left.add([v.index for v in objects[1].data.vertices if v.co.x < 0], 1.0, "REPLACE")
     decimate = objects[1].modifiers.new("Coarse", "DECIMATE")
     decimate.ratio, decimate.vertex_group = 0.55, "Left"
+    bpy.ops.mesh.primitive_cube_add(location=(5.2, 0, 0))
     fmqm = bpy.context.scene.fmqm
     fmqm.reference = objects[0]
     fmqm.compared.add().object = objects[1]
@@ -76,14 +80,16 @@ def start() -> None:
     bpy.ops.view3d.view_all()
     bpy.ops.view3d.view_axis(type="FRONT")
     region = area.spaces.active.region_3d
-    region.view_distance *= 0.55
-    region.view_location = (1.6, 0, 0)
+    region.view_distance *= 0.75
+    region.view_location = (3.2, 0, 0)
     for object_ in bpy.context.selected_objects:
         object_.select_set(False)
+    bpy.context.view_layer.objects.active = None  # whose origin would be drawn
 
 
 def measure() -> None:
     _, area = view()
+    REPORT["rendered"] = rendered("before")
     for region in area.regions:
         if region.type == "UI":
             region.active_panel_category = "FMQM"
@@ -105,18 +111,87 @@ def blocks() -> int:
     return sum(len(getattr(bpy.data, kind)) for kind in kinds)
 
 
+def shown() -> None:
+    """Measuring has painted the objects. What of it gets anywhere?"""
+    names = {object_.name for object_ in bpy.data.objects}
+    REPORT["blocks shown"] = blocks()
+    look = bpy.context.scene.fmqm.look
+    REPORT["show"], look.show = look.show, "OFF"
+    REPORT["size"] = saved("off")
+    look.show = "SURFACE"
+    REPORT["size shown"] = saved("shown")
+    cube = bpy.data.objects["Cube"]
+    region, space = next(r for r in view()[1].regions if r.type == "WINDOW"), view()[1].spaces.active
+    corners = [cube.matrix_world @ Vector(corner) for corner in cube.bound_box]
+    places = [location_3d_to_region_2d(region, space.region_3d, corner) for corner in corners]
+    REPORT["cube"] = [round(f(p[k] for p in places)) for f in (min, max) for k in (0, 1)]
+    REPORT["rendered shown"] = rendered("shown")
+    path = OUT / "shown.obj"
+    bpy.ops.wm.obj_export(filepath=str(path), export_materials=False)
+    lines = path.read_text().splitlines()
+    REPORT["exported"] = [line.removeprefix("o ") for line in lines if line.startswith("o ")]
+    _, area = view()
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    picked: set[str] = set()
+    for x in range(0, region.width, 60):
+        for y in range(0, region.height, 60):
+            bpy.ops.view3d.select(deselect_all=True, location=(x, y))
+            picked |= {object_.name for object_ in bpy.context.selected_objects}
+    bpy.ops.object.select_all(action="DESELECT")
+    bpy.context.view_layer.objects.active = None
+    REPORT["picked"] = sorted(picked)
+    REPORT["not ours"] = sorted(names)
+
+
+def saved(name: str) -> int:
+    """Bytes of the file with the scene's results and without the undo of them."""
+    path = OUT / f"{name}.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, compress=False)
+    return path.stat().st_size
+
+
+def rendered(name: str) -> str:
+    """A digest of a render's pixels."""
+    scene = bpy.context.scene
+    scene.render.engine = "BLENDER_WORKBENCH"
+    scene.render.resolution_x, scene.render.resolution_y = 160, 120
+    path = OUT / f"rendered_{name}.png"
+    scene.render.filepath = str(path)
+    bpy.ops.render.render(write_still=True)
+    image = bpy.data.images.load(str(path))
+    pixels = np.empty(4 * 160 * 120, np.float32)
+    image.pixels.foreach_get(pixels)
+    bpy.data.images.remove(image)
+    return hashlib.sha256(pixels.tobytes()).hexdigest()
+
+
+def xray() -> None:
+    view()[1].spaces.active.shading.show_xray = True
+
+
+def overlays_off() -> None:
+    view()[1].spaces.active.shading.show_xray = False
+    view()[1].spaces.active.overlay.show_overlays = False
+
+
+def points() -> None:
+    view()[1].spaces.active.overlay.show_overlays = True
+    bpy.context.scene.fmqm.look.show = "POINTS"
+
+
+def worst() -> None:
+    REPORT["place before"] = list(view()[1].spaces.active.region_3d.view_location)
+    bpy.ops.fmqm.worst_step(step=1)
+
+
 def clear() -> None:
     rows = bpy.context.scene.fmqm.rows
     bpy.ops.fmqm.clear()
+    REPORT["place after"] = list(view()[1].spaces.active.region_3d.view_location)
     REPORT["blocks after"] = blocks()
     REPORT["rows"] = [(row.name, json.loads(row.scores)["scores"], row.error) for row in rows]
     REPORT["longest tick"] = session().longest_tick
     (OUT / "report.json").write_text(json.dumps(REPORT))
-
-
-def look() -> None:
-    bpy.context.scene.fmqm.look.range = "FITTED"
-    bpy.ops.fmqm.look()
 
 
 def other_layer() -> None:
@@ -125,10 +200,14 @@ def other_layer() -> None:
 
 STEPS: list[tuple[Callable[[], object], str]] = [
     (start, ""),
-    (measure, "before"),
-    (look, "look"),
+    (lambda: None, "before"),
+    (measure, ""),
+    (shown, "look"),
+    (xray, "xray"),
+    (overlays_off, "overlays off"),
+    (points, "points"),
     (other_layer, "layer"),
-    (lambda: bpy.ops.fmqm.worst_step(step=1), "worst"),
+    (worst, "worst"),
     (clear, "cleared"),
 ]
 

@@ -21,7 +21,7 @@ from .. import arrays
 TAG = "fmqm"  # custom property of every data-block of ours: what it is for
 COLLECTION = "FMQM"
 COLOR = "FMQM"  # name of the color attribute
-CLOUD, PAINTED, SHELLS, SLICE = "cloud", "painted", "shells", "slice"
+CLOUD, CLOUD_LOD, PAINTED, PAINTED_LOD, SLICE = "cloud", "cloud lod", "painted", "painted lod", "slice"
 
 # A regular tetrahedron around the origin, of radius 1, its faces outwards.
 _CORNERS = np.array([(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)], np.float32) / np.sqrt(np.float32(3))
@@ -79,20 +79,11 @@ def recolor(object_: bpy.types.Object, colors: Floats) -> None:
     mesh.update()
 
 
-def resize(object_: bpy.types.Object, size: float, shown: NDArray[np.bool_] | None = None) -> None:
-    """Gives the points of a cloud another radius.
-
-    Args:
-        size: in the cloud's own units. shown: (N,) the other points shrink to nothing; None keeps which.
-    """
-    mesh: bpy.types.Mesh = object_.data
-    corners = arrays.read_attribute(mesh, "position", "vector", 3, np.float32).reshape(-1, 4, 3)
-    if shown is None:
-        shown = (corners[:, 0] != corners[:, 1]).any(axis=1)
-    centers = corners.mean(axis=1, keepdims=True)
-    corners = centers + np.where(shown, np.float32(size), np.float32(0))[:, None, None] * _CORNERS
-    arrays.write(mesh.attributes["position"].data, "vector", corners)
-    mesh.update()
+def tetrahedra(positions: Floats, size: float) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    """(N, 4, 3) corners of points of a radius, and their (4 N, 3) triangles."""
+    corners = positions.astype(np.float32)[:, None, :] + np.float32(size) * _CORNERS
+    first = 4 * np.arange(len(positions), dtype=np.int32)
+    return corners, (first[:, None, None] + _FACES).reshape(-1, 3)
 
 
 def build_slice(scene: bpy.types.Scene, name: str, matrix: Floats, resolution: int) -> bpy.types.Object:
@@ -106,6 +97,7 @@ def build_slice(scene: bpy.types.Scene, name: str, matrix: Floats, resolution: i
         object_[TAG] = SLICE
         object_.empty_display_type = "IMAGE"
         object_.empty_display_size = 1.0
+        object_.hide_render = True
         object_.matrix_world = Matrix(matrix.tolist())
     image = object_.data
     if image is None or tuple(image.size) != (resolution, resolution):
@@ -152,11 +144,6 @@ def clear() -> int:
 def anything() -> bool:
     """Whether the file has a data-block of ours."""
     return any(True for blocks in _all_blocks() for _ in _ours(blocks))
-
-
-def anything_colored() -> bool:
-    """Whether it has one whose colors Solid shading has to be told to show."""
-    return any(True for _ in _ours(bpy.data.meshes))
 
 
 def _all_blocks() -> tuple[bpy.types.bpy_prop_collection, ...]:
@@ -209,9 +196,8 @@ def _layer_collections(layer: bpy.types.LayerCollection) -> Iterator[bpy.types.L
 
 
 def _cloud_mesh(name: str, positions: Floats, normals: Floats, size: float) -> bpy.types.Mesh:
-    vertices = positions.astype(np.float32)[:, None, :] + np.float32(size) * _CORNERS
-    first = 4 * np.arange(len(positions), dtype=np.int32)
-    mesh = _mesh(name, vertices.reshape(-1, 3), (first[:, None, None] + _FACES).reshape(-1, 3))
+    vertices, triangles = tetrahedra(positions, size)
+    mesh = _mesh(name, vertices.reshape(-1, 3), triangles)
     normal = mesh.attributes.new("custom_normal", "FLOAT_VECTOR", "POINT")
     arrays.write(normal.data, "vector", np.repeat(normals.astype(np.float32), 4, axis=0))
     return mesh

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The 3D viewports: letting Solid shading show colors, and giving it back; framing a place."""
+"""The 3D viewports: framing a place, and going back from it."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
+from typing import Any
 
 import bpy
 import numpy as np
@@ -12,61 +12,8 @@ from mathutils import Matrix, Vector
 
 from ...metric.geometry import Floats
 
-# On a Screen, which undo does not touch and which is saved with the views: what we changed, and from what.
-_BEFORE = "fmqm_shading"
-# Solid shading shows the color attribute, in the light made for judging painted colors: the usual one
-# shows less than half of a color's brightness, and legends would not match.
-_OURS = {"color_type": "VERTEX", "studio_light": "paint.sl"}
 _MARGIN = 1.9  # view distance in diameters of what is framed, at Blender's usual focal length
-
-
-def show_colors() -> None:
-    """Has Solid shading show color attributes in every 3D view; restore_colors() undoes it."""
-    for screen in bpy.data.screens:
-        before = json.loads(screen.get(_BEFORE, "{}"))
-        for key, space in _spaces(screen):
-            shading = space.shading
-            for name, value in _OURS.items():
-                # The light's name is Solid's only while Solid is on; flat light and matcaps are the user's choice.
-                if name == "studio_light" and (shading.type, shading.light) != ("SOLID", "STUDIO"):
-                    continue
-                was = getattr(shading, name)
-                if was != value and _set(shading, name, value):
-                    before.setdefault(key, {}).setdefault(name, was)
-        if before:
-            screen[_BEFORE] = json.dumps(before)
-
-
-def restore_colors() -> None:
-    """Gives every 3D view the shading it had; a view that was split off since gets its screen's."""
-    for screen in bpy.data.screens:
-        if _BEFORE not in screen:
-            continue
-        before = json.loads(screen[_BEFORE])
-        usual = next(iter(before.values()))
-        for key, space in _spaces(screen):
-            shading, kind = space.shading, space.shading.type
-            if kind != "SOLID":
-                shading.type = "SOLID"
-            for name, was in before.get(key, usual).items():
-                if getattr(shading, name) == _OURS[name]:  # else the user has chosen since
-                    _set(shading, name, was)
-            if kind != "SOLID":
-                shading.type = kind
-        del screen[_BEFORE]
-
-
-def _set(shading: bpy.types.View3DShading, name: str, value: str) -> bool:
-    try:
-        setattr(shading, name, value)
-    except TypeError:  # an installation without that light
-        return False
-    return True
-
-
-def colors_changed() -> bool:
-    """Whether restore_colors() has something to do."""
-    return any(_BEFORE in screen for screen in bpy.data.screens)
+_before: dict[int, dict[str, Any]] = {}  # by area: where a view was before it was framed
 
 
 def show_in_local_views(object_: bpy.types.Object) -> None:
@@ -88,6 +35,7 @@ def frame_place(area: bpy.types.Area | None, center: Floats, diameter: float, no
     if area is None or area.type != "VIEW_3D":
         return
     region = area.spaces.active.region_3d
+    _before.setdefault(area.as_pointer(), _pose(region))
     if region.view_perspective == "CAMERA":
         region.view_perspective = "PERSP"
     region.view_location = Vector(center.tolist())
@@ -95,6 +43,22 @@ def frame_place(area: bpy.types.Area | None, center: Floats, diameter: float, no
     if np.linalg.norm(normal) > 0:
         region.view_rotation = _facing(Vector(normal.tolist())).to_quaternion()
     area.tag_redraw()
+
+
+def unframe() -> None:
+    """Takes the views that were framed back to where they were before."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            pose = _before.pop(area.as_pointer(), None)
+            if pose is not None and area.type == "VIEW_3D":
+                for name, value in pose.items():
+                    setattr(area.spaces.active.region_3d, name, value)
+    _before.clear()
+
+
+def _pose(region: bpy.types.RegionView3D) -> dict[str, Any]:
+    copied = {name: getattr(region, name).copy() for name in ("view_location", "view_rotation")}
+    return {"view_perspective": region.view_perspective, "view_distance": region.view_distance, **copied}
 
 
 def _facing(direction: Vector) -> Matrix:

@@ -13,6 +13,7 @@ from ...metric.evaluation import Result
 from ...metric.fields import Fields
 from ...metric.geometry import Floats, dot
 from .colormap import GREY_DARK, GREY_LIGHT, SKY, VERMILION, number_colors, score_colors, signed_colors
+from .heat_map import fitted_range, round_ticks
 
 # How values become colors.
 SCORE = "score"  # 0 to 1, low is hot
@@ -25,10 +26,9 @@ NUMBER = "number"  # only told apart
 
 FIXED_LENGTH = {LENGTH: 0.01, SIGNED: 0.02}  # upper end of the fixed range, in diagonals of the reference
 FIT_PERCENTILE = 99.0  # a fitted range of samples ends here: a few wild ones would flatten all others
-SIDE_NAMES = ("Outside both", "Inside both", "Inside reference only", "Inside compared only")
+SIDE_NAMES = ("Outside both", "Inside both", "Inside original only", "Inside LOD only")
 _SIDE_COLORS = np.array([GREY_LIGHT, GREY_DARK, VERMILION, SKY])
 _TICKS = 5
-_CHUNK = 1 << 22  # elements of a distance table at once
 
 
 @dataclass(frozen=True)
@@ -55,17 +55,17 @@ LAYERS: dict[str, Layer] = {
     layer.name: layer
     for layer in (
         Layer("FMQM", "FMQM", SCORE, "Quality of each patch: what the score is the mean of"),
-        Layer("geoSSIM", "Shape", SCORE, "geoSSIM: low where the surface moved away or lost relief"),
-        Layer("geoGraSSIM", "Direction", SCORE, "geoGraSSIM: low where the surface faces another way"),
-        Layer("colorSSIM", "Color", SCORE, "colorSSIM: low where colors changed or detail was lost"),
-        Layer("colorGraSSIM", "Color Edges", SCORE, "colorGraSSIM: low where edges in the texture moved or blurred"),
+        Layer("geoSSIM", "geoSSIM", SCORE, "Shape: low where the surface moved away or lost relief"),
+        Layer("geoGraSSIM", "geoGraSSIM", SCORE, "Facing: low where the surface faces another way"),
+        Layer("colorSSIM", "colorSSIM", SCORE, "Color: low where colors changed or detail was lost"),
+        Layer("colorGraSSIM", "colorGraSSIM", SCORE, "Detail: low where edges in the texture moved or blurred"),
         Layer("perceived", "Perceived", SCORE, "Perceived quality of each patch: what the score is the mean of"),
-        Layer("shape", "Perceived Shape", SCORE, "shape: low where the surface moved away or lost relief"),
-        Layer("facing", "Perceived Facing", SCORE, "facing: low where the surface faces another way, and shades so"),
-        Layer("color", "Perceived Color", SCORE, "color: low where colors or their contrast changed visibly"),
-        Layer("detail", "Perceived Detail", SCORE, "detail: low where the texture is blurred, moved or broken up"),
-        Layer("NCF_REFERENCE", "Color of Reference", COLOR, "NCF: the reference's color nearest to each sample"),
-        Layer("NCF_COMPARED", "Color of Compared", COLOR, "NCF: the compared object's color nearest to each sample"),
+        Layer("shape", "Shape", SCORE, "Low where the surface moved away or lost relief"),
+        Layer("facing", "Facing", SCORE, "Low where the surface faces another way, and shades so"),
+        Layer("color", "Color", SCORE, "Low where colors or their contrast changed visibly"),
+        Layer("detail", "Detail", SCORE, "Low where the texture is blurred, moved or broken up"),
+        Layer("NCF_REFERENCE", "Color of Original", COLOR, "NCF: the original's color nearest to each sample"),
+        Layer("NCF_COMPARED", "Color of LOD", COLOR, "NCF: the LOD's color nearest to each sample"),
         Layer(
             "NCF_DIFFERENCE",
             "Color Difference",
@@ -74,15 +74,15 @@ LAYERS: dict[str, Layer] = {
         ),
         Layer(
             "SDF_REFERENCE",
-            "Distance to Reference",
+            "Distance to Original",
             SIGNED,
-            "SDF: distance to the reference, negative inside",
+            "SDF: distance to the original, negative inside",
         ),
         Layer(
             "SDF_COMPARED",
-            "Distance to Compared",
+            "Distance to LOD",
             SIGNED,
-            "SDF: distance to the compared object, negative inside",
+            "SDF: distance to the LOD, negative inside",
         ),
         Layer(
             "SDF_DIFFERENCE",
@@ -131,7 +131,7 @@ def layer_values(result: Result, name: str, length: float | None = None) -> NDAr
         encoded colors for the kind COLOR.
     """
     if LAYERS[name].per_patch:
-        return _values_of_patches(result, name)[result.samples.patch]
+        return patch_values(result, name)[result.samples.patch]
     return field_values(name, result.ref, result.dist, result.frame.scale if length is None else length)
 
 
@@ -153,7 +153,7 @@ def field_values(name: str, ref: Fields, dist: Fields, length: float) -> NDArray
     return (ref if name == "SDF_REFERENCE" else dist).sdf * length
 
 
-def _values_of_patches(result: Result, name: str) -> NDArray[np.float64]:
+def patch_values(result: Result, name: str) -> NDArray[np.float64]:
     """(P,) a layer of the kinds SCORE and NUMBER."""
     if name == "PATCH":
         return np.arange(len(result.patches), dtype=np.float64)
@@ -174,8 +174,7 @@ def value_range(name: str, values: Floats, fitted: bool, diagonal: float) -> tup
         high = diagonal * FIXED_LENGTH.get(kind, 1.0 / diagonal)
         return (-high if kind == SIGNED else 0.0), high
     if kind == SCORE:
-        low, high = float(values.min()), float(values.max())
-        return (low, high) if high > low else (max(low - 0.005, 0.0), max(low, 0.005))
+        return fitted_range(values)
     high = float(np.percentile(np.abs(values), FIT_PERCENTILE)) or diagonal * 1e-6
     return (-high if kind == SIGNED else 0.0), high
 
@@ -193,21 +192,6 @@ def layer_colors(name: str, values: NDArray[np.float64], low: float, high: float
         return signed_colors(values / high)
     place = (values - low) / (high - low)
     return score_colors(place if kind == SCORE else 1 - place)
-
-
-def sample_colors(result: Result, name: str, fitted: bool, length: float) -> tuple[Floats, tuple[float, float]]:
-    """(N, 3) encoded colors of the samples, and the ends of the color map.
-
-    Args:
-        length: scene units of the metric's unit, which is the reference's diagonal.
-    """
-    if LAYERS[name].per_patch:  # few colors, many samples
-        values = _values_of_patches(result, name)
-        ends = value_range(name, values, fitted, length)
-        return layer_colors(name, values, *ends)[result.samples.patch], ends
-    values = field_values(name, result.ref, result.dist, length)
-    ends = value_range(name, values, fitted, length)
-    return layer_colors(name, values, *ends), ends
 
 
 def legend(
@@ -233,8 +217,13 @@ def legend(
     low, high = ends
     shown = np.linspace(low, high, 33)
     bar = tuple(tuple(color) for color in layer_colors(name, shown, low, high).tolist())
-    text = length_text if layer.kind in (LENGTH, SIGNED) else _number_text(high - low)
-    ticks = tuple((k / (_TICKS - 1), text(low + (high - low) * k / (_TICKS - 1))) for k in range(_TICKS))
+    if layer.kind == SCORE:
+        numbers = round_ticks(low, high)
+        text = _number_text(numbers[1] - numbers[0] if len(numbers) > 1 else high - low)
+    else:
+        numbers = np.linspace(low, high, _TICKS).tolist()
+        text = length_text if layer.kind in (LENGTH, SIGNED) else _number_text((high - low) / (_TICKS - 1))
+    ticks = tuple(((number - low) / (high - low), text(number)) for number in numbers)
     if layer.kind != SCORE:
         return Legend(layer.label, subtitle, bar, ticks)
     score = float(result.of_patches(name).mean())
@@ -243,35 +232,7 @@ def legend(
     return Legend(heading, subtitle, bar, ticks, (place, f"{score:.4f}"))
 
 
-def _number_text(span: float) -> Callable[[float], str]:
-    """Numbers with as many decimals as tell the ticks of a span apart."""
-    decimals = int(np.clip(np.ceil(-np.log10(max(span, 1e-12) / (_TICKS - 1))) + (span < 0.5), 2, 6))
+def _number_text(step: float) -> Callable[[float], str]:
+    """Numbers with as many decimals as tell ticks that are a step apart."""
+    decimals = int(np.clip(np.ceil(-np.log10(max(step, 1e-12)) - 1e-9), 1, 6))
     return lambda value: f"{value:.{decimals}f}"
-
-
-def blended_scores(result: Result, name: str) -> Floats:
-    """A layer that is per patch on the reference's surface, at the (V,) vertices of result.patch_mesh.
-
-    Scores go smoothly from patch to patch: a Gaussian mean of the patches around, by the distance to
-    their centers in their own size. For the number of the patch, it is the one that weighs most.
-    """
-    vertices = result.patch_mesh.vertices
-    scores = None if LAYERS[name].kind == NUMBER else result.of_patches(name).astype(np.float32)
-    centers = result.patch_centers.astype(np.float32)
-    width = np.array([patch.diagonal for patch in result.patches], np.float32) / 4
-    values = np.empty(len(vertices))
-    step = max(1, _CHUNK // len(centers))
-    for first in range(0, len(vertices), step):
-        here = vertices[first : first + step].astype(np.float32)
-        squared = np.zeros((len(here), len(centers)), np.float32)
-        for k in range(3):
-            gap = here[:, k, None] - centers[:, k]
-            squared += gap * gap
-        squared /= 2 * width * width
-        if scores is None:
-            values[first : first + step] = squared.argmin(axis=1)
-            continue
-        squared -= squared.min(axis=1, keepdims=True)  # far from every center the nearest still counts
-        weight = np.exp(-squared)
-        values[first : first + step] = weight @ scores / weight.sum(axis=1)
-    return values

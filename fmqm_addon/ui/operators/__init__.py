@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The sidebar's buttons."""
 
-from . import decimate, inputs, measure, pick, presets, results, save, view
+from . import decimate, inputs, measure, pick, presets, probe, results, save, view
 
 CLASSES: tuple[type, ...] = (
     *inputs.CLASSES,
@@ -11,5 +11,6 @@ CLASSES: tuple[type, ...] = (
     *save.CLASSES,
     *view.CLASSES,
     *pick.CLASSES,
+    *probe.CLASSES,
     *decimate.CLASSES,
 )

@@ -9,7 +9,7 @@ from typing import ClassVar
 import bpy
 
 from ...blender.scene.lods import are_kin, find_lods, lineage
-from ..properties.items import is_asset, kept
+from ..properties.items import is_asset, item_target, kept
 from ..properties.scene import FMQMScene
 
 
@@ -64,7 +64,7 @@ def reference_of(fmqm: FMQMScene) -> bpy.types.Object | bpy.types.Collection | N
 class FMQM_OT_use_selection(bpy.types.Operator):  # noqa: N801
     bl_idname = "fmqm.use_selection"
     bl_label = "Use Selection"
-    bl_description = "The active object becomes the reference, the other selected objects are compared with it"
+    bl_description = "The active object becomes the original, the other selected objects its LODs"
     bl_options: ClassVar = {"REGISTER", "UNDO"}
 
     @classmethod
@@ -97,7 +97,7 @@ class FMQM_OT_find_lods(bpy.types.Operator):  # noqa: N801
     bl_label = "Find LODs"
     bl_description = (
         "Find the levels of detail of the active object by names of objects, empties or collections (Rock_LOD0, "
-        "LOD1_Rock, x00_Rock, Rock_L0, Rock_high), an FBX LOD group or its collection. The finest is the reference"
+        "LOD1_Rock, x00_Rock, Rock_L0, Rock_high), an FBX LOD group or its collection. The finest is the original"
     )
     bl_options: ClassVar = {"REGISTER", "UNDO"}
 
@@ -146,7 +146,7 @@ class FMQM_OT_own_modifiers(bpy.types.Operator):  # noqa: N801
 class FMQM_OT_add_selected(bpy.types.Operator):  # noqa: N801
     bl_idname = "fmqm.add_selected"
     bl_label = "Add Selected"
-    bl_description = "Add the selected objects to the list, but for the reference"
+    bl_description = "Add the selected objects to the list, but for the original"
     bl_options: ClassVar = {"REGISTER", "UNDO"}
 
     @classmethod
@@ -204,6 +204,36 @@ class FMQM_OT_remove_compared(bpy.types.Operator):  # noqa: N801
         return {"FINISHED"}
 
 
+class FMQM_OT_swap(bpy.types.Operator):  # noqa: N801
+    bl_idname = "fmqm.swap"
+    bl_label = "Swap with Original"
+    bl_description = "The chosen LOD becomes the original, and the original an LOD in its place"
+    bl_options: ClassVar = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        fmqm = context.scene.fmqm
+        if fmqm.bare_reference:
+            cls.poll_message_set("The original is the same object without its modifiers")
+            return False
+        if reference_of(fmqm) is None or not 0 <= fmqm.compared_index < len(fmqm.compared):
+            cls.poll_message_set("Choose an original and an LOD")
+            return False
+        return item_target(fmqm.compared[fmqm.compared_index]) is not None
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        fmqm = context.scene.fmqm
+        index = fmqm.compared_index
+        chosen, original = item_target(fmqm.compared[index]), reference_of(fmqm)
+        if chosen is None or original is None:
+            return {"CANCELLED"}
+        fmqm.compared.remove(index)
+        set_reference(fmqm, chosen)
+        _add_compared(fmqm, original)
+        fmqm.compared.move(len(fmqm.compared) - 1, index)
+        return {"FINISHED"}
+
+
 class FMQM_OT_clear_compared(bpy.types.Operator):  # noqa: N801
     bl_idname = "fmqm.clear_compared"
     bl_label = "Clear List"
@@ -226,5 +256,6 @@ CLASSES = (
     FMQM_OT_add_selected,
     FMQM_OT_add_collection,
     FMQM_OT_remove_compared,
+    FMQM_OT_swap,
     FMQM_OT_clear_compared,
 )

@@ -13,8 +13,9 @@ import numpy as np
 from ...blender.materials.types import Reading
 from ...blender.scene.lods import are_kin
 from ...blender.scene.measure import Outcome, measuring
-from ...blender.scene.target import target_of
+from ...blender.scene.target import Target, target_of
 from ...metric.errors import FMQMError
+from ...metric.geometry import Floats
 from ...report.trust_table import trust_dict
 from .. import session, stale, stored_text
 from ..modal import SteppedOperator
@@ -22,7 +23,7 @@ from ..properties.items import item_target
 from ..properties.rows import row_targets
 from ..properties.scene import FMQMScene
 from ..properties.settings import pair_options, patterns_of
-from ..view.shown import forget_removed
+from ..view.shown import forget_removed, show_heat_map
 from .inputs import reference_of
 
 
@@ -31,26 +32,24 @@ def why_not(fmqm: FMQMScene) -> str:
     reference = reference_of(fmqm)
     if reference is None:
         gone = fmqm.reference_kind == "OBJECT" and fmqm.reference is not None
-        return (
-            f"{fmqm.reference.name} is gone; choose another reference" if gone else "Choose a reference: the original"
-        )
+        return f"{fmqm.reference.name} is gone; choose another original" if gone else "Choose the original"
     compared = [target for item in fmqm.compared if (target := item_target(item)) is not None]
     if not compared:
-        return "Add an object to compare with the reference"
+        return "Add an LOD to compare with the original"
     if reference in compared and not fmqm.bare_reference:
-        return f"{reference.name} is the reference and in the list too; remove it there, or use Own Modifiers"
+        return f"{reference.name} is the original and in the list too; remove it there, or use Own Modifiers"
     part = next((target for target in compared if are_kin(target, reference)), None)
     if part is not None:
         return f"{part.name} is measured with {reference.name}, as one hangs from the other; remove it from the list"
     if fmqm.bare_reference and (fmqm.reference_kind != "OBJECT" or reference.type != "MESH"):
-        return "Without Modifiers needs a single mesh object as the reference"
+        return "Without Modifiers needs a single mesh object as the original"
     return ""
 
 
 class FMQM_OT_measure(SteppedOperator, bpy.types.Operator):  # noqa: N801
     bl_idname = "fmqm.measure"
     bl_label = "Measure Quality"
-    bl_description = "Score the listed objects against the reference. Esc cancels"
+    bl_description = "Score the listed LODs against the original. Esc cancels"
     bl_options: ClassVar = {"UNDO"}  # no REGISTER: adjusting the last operation would measure all over again
 
     @classmethod
@@ -91,6 +90,7 @@ class FMQM_OT_measure(SteppedOperator, bpy.types.Operator):  # noqa: N801
             _write_row(scene.fmqm, outcome, self._settings_text)
         _choose_row(scene.fmqm, outcomes[0])
         forget_removed()  # of rows that these replace
+        show_heat_map(scene)
         failed = [outcome for outcome in outcomes if outcome.error]
         total = sum(outcome.seconds.get("total", 0.0) for outcome in outcomes)
         if failed:
@@ -125,6 +125,7 @@ def _write_row(fmqm: FMQMScene, outcome: Outcome, settings_text: str) -> None:
     if row is not None and row.scores and outcome.error and any(target.is_gone() for target in key):
         return
     row = row or fmqm.rows.add()
+    row.former = row.scores if row.settings == settings_text else ""
     row.uid = uuid.uuid4().hex
     row.name, row.kind = outcome.target.name, outcome.target.kind
     row.reference_name, row.reference_kind = outcome.reference_target.name, outcome.reference_target.kind
@@ -155,8 +156,16 @@ def _write_row(fmqm: FMQMScene, outcome: Outcome, settings_text: str) -> None:
                 comparison=result.comparison,
                 reference_to_world=np.eye(4),  # it is measured where it stands
                 distorted_to_world=result.alignment.to_world,
+                reference_stood=_stand(outcome.reference_target),
+                distorted_stood=_stand(outcome.target),
             ),
         )
+
+
+def _stand(target: Target) -> Floats | None:
+    """(4, 4) the world matrix of a single object."""
+    members = target.members()
+    return np.array(members[0].matrix_world, np.float64) if len(members) == 1 else None
 
 
 def _choose_row(fmqm: FMQMScene, outcome: Outcome) -> None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import bpy
 
-from ...blender.display import scene_objects
 from ...metric.errors import FMQMError
-from ..view import cloud, units
+from ..view import heat, units
+from ..view.result import look_of
 from .view import has_samples
 
 _REACH = 14  # pixels around the mouse in which a sample is picked
@@ -29,8 +29,7 @@ class FMQM_OT_unit_pick(bpy.types.Operator):  # noqa: N801
 
     def invoke(self, context: bpy.types.Context, _: bpy.types.Event) -> set[str]:
         self._area = context.area
-        if scene_objects.find_object(context.scene, scene_objects.CLOUD) is None:
-            cloud.show_cloud(context.scene)
+        look_of(context.scene).show = heat.POINTS
         context.window.cursor_modal_set("CROSSHAIR")
         context.workspace.status_text_set(_STATUS)
         context.window_manager.modal_handler_add(self)
@@ -46,7 +45,7 @@ class FMQM_OT_unit_pick(bpy.types.Operator):  # noqa: N801
         if event.type != "LEFTMOUSE" or event.value != "PRESS":
             return {"PASS_THROUGH"}
         region = next((r for r in self._area.regions if r.type == "WINDOW"), None)
-        if region is None or not _holds(self._area, region, event):
+        if region is None or not holds(self._area, region, event):
             return {"PASS_THROUGH"}  # buttons go on working
         at = (event.mouse_x - region.x, event.mouse_y - region.y)
         reach = _REACH * context.preferences.system.ui_scale
@@ -69,7 +68,7 @@ class FMQM_OT_unit_pick(bpy.types.Operator):  # noqa: N801
         return {"FINISHED"}
 
 
-def _holds(area: bpy.types.Area, window: bpy.types.Region, event: bpy.types.Event) -> bool:
+def holds(area: bpy.types.Area, window: bpy.types.Region, event: bpy.types.Event) -> bool:
     """Whether the mouse is in the view and not over a toolbar or the sidebar."""
 
     def within(region: bpy.types.Region) -> bool:

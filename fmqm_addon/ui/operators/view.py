@@ -8,9 +8,8 @@ from typing import Any
 import bpy
 from bpy.props import IntProperty
 
-from ...blender.display import scene_objects
 from ...metric.errors import FMQMError
-from ..view import cloud, painted, shells, shown, slice_plane, units, worst
+from ..view import heat, kept, shells, shown, slice_plane, units, worst
 from ..view.result import look_of, measured_row
 
 
@@ -45,50 +44,50 @@ class ShowOperator:
         raise NotImplementedError
 
 
-class FMQM_OT_look(ShowOperator, bpy.types.Operator):  # noqa: N801 Blender's naming
-    bl_idname = "fmqm.look"
-    bl_label = "Show Points"
-    bl_description = "Show the samples of the chosen result as a cloud of colored points"
+class FMQM_OT_keep(ShowOperator, bpy.types.Operator):  # noqa: N801 Blender's naming
+    bl_idname = "fmqm.keep"
+    bl_label = "Keep as Objects"
+    bl_description = (
+        "Make objects of what is shown, for renders and export: their material glows in the colors. "
+        "Solid shading shows these by Color > Attribute. Clear View removes them"
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if look_of(context.scene).show == heat.OFF:
+            cls.poll_message_set("Choose Surface or Points first")
+            return False
+        return has_samples(cls, context)
 
     def act(self, context: bpy.types.Context) -> None:
-        cloud.show_cloud(context.scene)
-
-
-class FMQM_OT_paint_surface(ShowOperator, bpy.types.Operator):  # noqa: N801
-    bl_idname = "fmqm.paint_surface"
-    bl_label = "Paint Surface"
-    bl_description = "Paint the same values on a copy of the reference's surface, smooth between patches"
-
-    def act(self, context: bpy.types.Context) -> None:
-        painted.paint_surface(context.scene)
+        kept.keep_as_objects(context.scene)
 
 
 class FMQM_OT_worst_step(ShowOperator, bpy.types.Operator):  # noqa: N801
     bl_idname = "fmqm.worst_step"
     bl_label = "Next Worst Place"
-    bl_description = "Frame the next of the lowest patches and show only its points"
+    bl_description = "Frame the next of the lowest patches and show only it"
 
     step: IntProperty(name="Step", description="How far along the list", default=1, min=-1000, max=1000)
 
     @classmethod
     def description(cls, _: bpy.types.Context, properties: Any) -> str:
         which = "next" if properties.step > 0 else "previous" if properties.step < 0 else "chosen one"
-        return f"Frame the {which} of the lowest patches and show only its points"
+        return f"Frame the {which} of the lowest patches and show only it"
 
     def act(self, context: bpy.types.Context) -> None:
         look = look_of(context.scene)
-        uid, _, _ = measured_row(context.scene)
-        if look.worst_uid != uid or scene_objects.find_object(context.scene, scene_objects.CLOUD) is None:
-            cloud.show_cloud(context.scene)
+        uid, _, measured = measured_row(context.scene)
+        worst.fill_worst(look, measured.comparison.result, uid)
         if look.focused and look.worst:  # the first press shows the worst one
             worst.choose_worst(look, (look.worst_index + self.step) % len(look.worst))
-        cloud.focus_patch(context.scene, context.area)
+        worst.focus_patch(context.scene, context.area)
 
 
 class FMQM_OT_worst_all(bpy.types.Operator):  # noqa: N801
     bl_idname = "fmqm.worst_all"
     bl_label = "Show All Patches"
-    bl_description = "Show the points of every patch again"
+    bl_description = "Show every patch again"
     bl_options = {"UNDO"}
 
     @classmethod
@@ -99,7 +98,7 @@ class FMQM_OT_worst_all(bpy.types.Operator):  # noqa: N801
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        cloud.show_all_patches(context.scene)
+        worst.show_all_patches(context.scene)
         return {"FINISHED"}
 
 
@@ -141,7 +140,7 @@ class FMQM_OT_unit_step(ShowOperator, bpy.types.Operator):  # noqa: N801
 class FMQM_OT_clear(bpy.types.Operator):  # noqa: N801
     bl_idname = "fmqm.clear"
     bl_label = "Clear View"
-    bl_description = "Remove all points, surfaces and slices that were added, and restore the views' colors"
+    bl_description = "Take away the heat map and all objects that were added, and go back to the view before"
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
@@ -157,8 +156,7 @@ class FMQM_OT_clear(bpy.types.Operator):  # noqa: N801
 
 
 CLASSES: tuple[type, ...] = (
-    FMQM_OT_look,
-    FMQM_OT_paint_surface,
+    FMQM_OT_keep,
     FMQM_OT_worst_step,
     FMQM_OT_worst_all,
     FMQM_OT_shells,

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The sidebar's panels. They show what is stored and compute nothing."""
 
-from . import decimate, main, parts, results, settings, trust, view
+from . import decimate, details, main, parts, results, settings, trust, view
 
 # Panels before their sub-panels.
 CLASSES: tuple[type, ...] = (
     *main.CLASSES,
     *settings.CLASSES,
     *results.CLASSES,
+    *details.CLASSES,
     *parts.CLASSES,
     *trust.CLASSES,
     *view.CLASSES,

@@ -18,7 +18,7 @@ class FMQM_PT_decimate(Sidebar, bpy.types.Panel):  # noqa: N801
     bl_idname = "FMQM_PT_decimate"
     bl_label = "Decimate to Quality"
     bl_options: ClassVar = {"DEFAULT_CLOSED"}
-    bl_order = 6
+    bl_order = 8
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, decimate = self.layout, context.scene.fmqm.decimate

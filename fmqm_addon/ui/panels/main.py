@@ -5,11 +5,16 @@ from __future__ import annotations
 
 import bpy
 
+from ...blender.scene.target import target_of
+from ...blender.scene.triangle_count import triangle_count
 from .. import session
+from ..operators.inputs import reference_of
 from ..operators.measure import why_not
 from ..properties.items import FMQMItem, item_target
 from ..properties.scene import FMQMScene
-from .sidebar import Sidebar, wrapped
+from .sidebar import CHARACTER, Sidebar, cut_in_the_middle, short_count, width, wrapped
+
+_COUNT = 44  # pixels at scale 1, of the column of triangles
 
 
 class FMQM_UL_compared(bpy.types.UIList):  # noqa: N801
@@ -17,7 +22,7 @@ class FMQM_UL_compared(bpy.types.UIList):  # noqa: N801
 
     def draw_item(
         self,
-        _context: bpy.types.Context,
+        context: bpy.types.Context,
         layout: bpy.types.UILayout,
         _data: FMQMScene,
         item: FMQMItem,
@@ -29,11 +34,16 @@ class FMQM_UL_compared(bpy.types.UIList):  # noqa: N801
         if target is None:
             name = item.name if item.object is None else item.object.name
             layout.label(text=f"{name} (gone)", icon="ERROR", translate=False)
-        elif isinstance(target, bpy.types.Collection):
-            layout.label(text=target.name, icon="OUTLINER_COLLECTION", translate=False)
-        else:
+            return
+        icon = "OUTLINER_COLLECTION"
+        if isinstance(target, bpy.types.Object):
             icon = "OBJECT_DATA" if target.type == "MESH" else "EMPTY_DATA"
-            layout.label(text=target.name, icon=icon, translate=False)
+        whole = width(context) - 94
+        split = layout.split(factor=1 - _COUNT / max(whole, 2 * _COUNT))
+        name = cut_in_the_middle(target.name, int((whole - _COUNT) / CHARACTER) - 3)
+        split.label(text=name, icon=icon, translate=False)
+        count = triangle_count(target_of(target), context.view_layer.depsgraph)
+        split.label(text="" if count is None else short_count(count), translate=False)
 
 
 class FMQM_MT_compared(bpy.types.Menu):  # noqa: N801
@@ -51,18 +61,24 @@ class FMQM_PT_main(Sidebar, bpy.types.Panel):  # noqa: N801
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, fmqm = self.layout, context.scene.fmqm
-        self._draw_reference(layout, fmqm)
+        if reference_of(fmqm) is None and not fmqm.compared:
+            wrapped(layout, context, "Select the LODs, then the original last, and press Use Selection", icon="INFO")
+        self._draw_reference(layout, context, fmqm)
         self._draw_compared(layout, fmqm)
         self._draw_measure(layout, context, fmqm)
 
-    def _draw_reference(self, layout: bpy.types.UILayout, fmqm: FMQMScene) -> None:
+    def _draw_reference(self, layout: bpy.types.UILayout, context: bpy.types.Context, fmqm: FMQMScene) -> None:
         column = layout.column(align=True)
         column.operator("fmqm.find_lods", icon="VIEWZOOM")
         row = column.row(align=True)
         row.operator("fmqm.use_selection")
         row.operator("fmqm.own_modifiers")
         column = layout.column(align=True)
-        column.label(text="Reference")
+        original = reference_of(fmqm)
+        count = None
+        if original is not None:
+            count = triangle_count(target_of(original, fmqm.bare_reference), context.view_layer.depsgraph)
+        column.label(text="Original" if count is None else f"Original: {count:,} triangles")
         row = column.row(align=True)
         row.prop(fmqm, "reference_kind", expand=True, icon_only=True)
         row.prop(fmqm, "reference" if fmqm.reference_kind == "OBJECT" else "reference_collection", text="")
@@ -71,13 +87,13 @@ class FMQM_PT_main(Sidebar, bpy.types.Panel):  # noqa: N801
 
     def _draw_compared(self, layout: bpy.types.UILayout, fmqm: FMQMScene) -> None:
         column = layout.column(align=True)
-        column.label(text="Compared")
+        column.label(text="LODs")
         row = column.row()
         row.template_list("FMQM_UL_compared", "", fmqm, "compared", fmqm, "compared_index", rows=3)
         side = row.column(align=True)
         side.operator("fmqm.add_selected", text="", icon="ADD")
         side.operator("fmqm.remove_compared", text="", icon="REMOVE")
-        side.separator()
+        side.operator("fmqm.swap", text="", icon="FILE_REFRESH")
         side.menu("FMQM_MT_compared", text="", icon="DOWNARROW_HLT")
 
     def _draw_measure(self, layout: bpy.types.UILayout, context: bpy.types.Context, fmqm: FMQMScene) -> None:
@@ -88,6 +104,10 @@ class FMQM_PT_main(Sidebar, bpy.types.Panel):  # noqa: N801
             column.label(text=job.text, translate=False)
             layout.operator("fmqm.cancel", icon="X")
             return
+        finer = _finer_than_original(context, fmqm)
+        if finer:
+            wrapped(layout, context, f"{finer} has more triangles than the original: swap them?", icon="ERROR")
+        layout.prop(fmqm.settings, "preset", text="")
         row = layout.row()
         row.scale_y = 1.5
         row.operator_context = "INVOKE_DEFAULT"
@@ -95,6 +115,20 @@ class FMQM_PT_main(Sidebar, bpy.types.Panel):  # noqa: N801
         reason = why_not(fmqm)
         if reason:
             wrapped(layout, context, reason, icon="INFO")
+
+
+def _finer_than_original(context: bpy.types.Context, fmqm: FMQMScene) -> str:
+    """The first LOD that has more triangles than its original; "" if none has."""
+    original, depsgraph = reference_of(fmqm), context.view_layer.depsgraph
+    most = None if original is None else triangle_count(target_of(original, fmqm.bare_reference), depsgraph)
+    if most is None or fmqm.bare_reference:  # modifiers may well add some
+        return ""
+    for item in fmqm.compared:
+        target = item_target(item)
+        count = None if target is None else triangle_count(target_of(target), depsgraph)
+        if target is not None and count is not None and count > most:
+            return str(target.name)
+    return ""
 
 
 CLASSES = (FMQM_UL_compared, FMQM_MT_compared, FMQM_PT_main)

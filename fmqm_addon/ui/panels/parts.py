@@ -16,9 +16,9 @@ _SHOWN = 12  # of the parts; reports show all
 
 class FMQM_PT_parts(Sidebar, bpy.types.Panel):  # noqa: N801
     bl_idname = "FMQM_PT_parts"
-    bl_parent_id = "FMQM_PT_results"
+    bl_parent_id = "FMQM_PT_details"
     bl_label = "Parts"
-    bl_description = "Objects, materials and connected parts of the reference, the worst first"
+    bl_description = "Objects, materials and connected parts of the original, the worst first"
     bl_options: ClassVar = {"DEFAULT_CLOSED"}
 
     @classmethod

@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import bpy
 
-from ...comparison.alignment import SPACE_LABELS
 from ...comparison.judge import Judge
 from ...report.explain import verdict
 from ...report.records import pair_record
@@ -15,56 +16,98 @@ from ..properties.rows import (
     FMQMRow,
     active_row,
     comparable,
+    is_quick,
     is_whole,
     pair_of,
-    row_attribution,
-    row_reverse,
+    row_former,
     row_scores,
-    row_stderr,
-    settings_name,
 )
 from ..properties.scene import FMQMScene
-from .sidebar import Sidebar, wrapped
-
-_WIDE = 330  # pixels at scale 1: from here on the rows have room for the four features
-_SHORT_SPACE = {SPACE_LABELS["location"]: "Origins Aligned"}
-NOT_SEEN = "Normal maps, roughness and lighting are not part of FMQM"
+from .sidebar import CHARACTER, Sidebar, cut_in_the_middle, short_count, width, wrapped
+from .swatches import swatch
 
 
 class FMQM_UL_rows(bpy.types.UIList):  # noqa: N801
-    """Name and the judge's score, in a wide sidebar its features too; grey at other settings than the chosen row's."""
+    """A table of the LODs: what does not fit into a narrow sidebar is left out, never cut. Grey at other settings."""
 
     def draw_item(
         self,
         context: bpy.types.Context,
         layout: bpy.types.UILayout,
-        fmqm: FMQMScene,
+        _fmqm: FMQMScene,
         row: FMQMRow,
         _icon: int,
         _active_data: FMQMScene,
         _active_property: str,
     ) -> None:
-        icon = "BLANK1"  # names stay in line
+        icon = "NONE"
         if row.error or row_scores(row) is None:
             icon = "CANCEL"
         elif row.uid in session.stale:
             icon = "FILE_REFRESH"
         elif row.warnings:
             icon = "ERROR"
-        scores = row_scores(row)
-        if scores is None:
-            layout.label(text=row.name, icon=icon, translate=False)
+        scores, chosen = row_scores(row), active_row(context.scene)
+        layout.active = chosen is None or comparable(row, chosen)
+        cells = _cells(row, scores)
+        for (column, share), place in _split(layout, columns_for(width(context), context.scene.fmqm.judge)):
+            if column == "name":
+                text = cut_in_the_middle(row.name, int(share / CHARACTER) - (2 if icon == "NONE" else 5))
+                place.label(text=text, icon=icon, translate=False)
+            elif column == "bar" and scores is not None:
+                place.progress(factor=scores["perceived"], text="")
+            else:
+                place.label(text=cells.get(column, ""), translate=False)
+
+
+def _cells(row: FMQMRow, scores: dict[str, float] | None) -> dict[str, str]:
+    if scores is None:
+        return {}
+    return {
+        "triangles": short_count(row.triangles),
+        "share": f"{row.share:.0f} %" if row.share >= 1 else f"{row.share:.1g} %",
+        "FMQM": f"{scores['FMQM']:.3f}",
+        "perceived": f"{scores['perceived']:.3f}",
+    }
+
+
+# Columns of the table with their heads and widths, in pixels at scale 1, in the order in which they appear; the number
+# says from which width of the sidebar on.
+_TABLE = (
+    ("triangles", "Tris", 46, 330),
+    ("share", "Share", 46, 300),
+    ("FMQM", "FMQM", 48, 0),
+    ("perceived", "Perc.", 48, 240),
+    ("bar", "", 40, 400),
+)
+_SENTENCES = 2  # of the explanation that stand with the verdict
+_BESIDE = 94  # of the list: what is left and right of the columns
+
+
+def columns_for(whole: float, judge_name: str) -> list[tuple[str, float]]:
+    """The columns that a sidebar of so many pixels at scale 1 has room for, with widths; the name gets the rest."""
+    judge = Judge[judge_name].column
+    narrow = whole < min(least for name, _, _, least in _TABLE if name == "perceived")
+    shown = [
+        (name, float(wide))
+        for name, _, wide, least in _TABLE
+        if (name == judge if narrow and name in ("FMQM", "perceived") else whole >= least)
+    ]
+    return [("name", max(whole - _BESIDE - sum(wide for _, wide in shown), 40.0)), *shown]
+
+
+def _split(
+    layout: bpy.types.UILayout, columns: list[tuple[str, float]]
+) -> Iterator[tuple[tuple[str, float], bpy.types.UILayout]]:
+    """A place in a row for each column."""
+    rest = sum(wide for _, wide in columns)
+    for number, column in enumerate(columns):
+        if number == len(columns) - 1:
+            yield column, layout.row()
             return
-        wide = context.region.width / context.preferences.system.ui_scale > _WIDE
-        split = layout.split(factor=0.36 if wide else 0.68)
-        split.label(text=row.name, icon=icon, translate=False)
-        numbers = split.row()
-        chosen = active_row(context.scene)
-        numbers.active = chosen is None or comparable(row, chosen)
-        judge = Judge[fmqm.judge]
-        numbers.label(text=f"{scores[judge.column]:.4f}")
-        for name in judge.features if wide else ():
-            numbers.label(text=f"{scores[name]:.2f}")
+        layout = layout.split(factor=column[1] / rest)
+        yield column, layout.row()
+        rest -= column[1]
 
 
 class FMQM_MT_results(bpy.types.Menu):  # noqa: N801
@@ -80,87 +123,86 @@ class FMQM_PT_results(Sidebar, bpy.types.Panel):  # noqa: N801
     bl_idname = "FMQM_PT_results"
     bl_parent_id = "FMQM_PT_main"
     bl_label = "Results"
-    bl_order = 2
+    bl_order = 1
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return bool(context.scene.fmqm.rows)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, fmqm = self.layout, context.scene.fmqm
-        if not fmqm.rows:
-            layout.label(text="Nothing measured yet")
-            return
+        chosen = active_row(context.scene)
+        if chosen is not None:
+            _draw_verdict(layout, context, fmqm, chosen)
         layout.row().prop(fmqm, "judge", expand=True)
         row = layout.row()
-        row.template_list("FMQM_UL_rows", "", fmqm, "rows", fmqm, "row_index", rows=3)
+        table = row.column(align=True)
+        _draw_heads(table, context)
+        count = min(max(len(fmqm.rows), 2), 8)
+        table.template_list("FMQM_UL_rows", "", fmqm, "rows", fmqm, "row_index", rows=count)
         side = row.column(align=True)
         side.operator("fmqm.sort_rows", text="", icon="SORTSIZE").column = Judge[fmqm.judge].column
         side.operator("fmqm.remove_row", text="", icon="REMOVE")
-        side.separator()
         side.menu("FMQM_MT_results", text="", icon="DOWNARROW_HLT")
-        chosen = active_row(context.scene)
-        if chosen is not None:
-            _draw_row(layout, context, fmqm, chosen)
+        if chosen is not None and not all(comparable(chosen, other) for other in fmqm.rows if row_scores(other)):
+            wrapped(layout, context, "Scores in grey were measured at other settings: do not compare", icon="INFO")
         row = layout.row(align=True)
         row.operator_context = "INVOKE_DEFAULT"
         row.label(text="Save")
         for kind in ("json", "csv", "npz"):
             row.operator("fmqm.save_results", text=kind.upper()).file_format = kind
-        note = layout.column()
-        note.active = False
-        wrapped(note, context, NOT_SEEN)
 
 
-def _draw_row(layout: bpy.types.UILayout, context: bpy.types.Context, fmqm: FMQMScene, row: FMQMRow) -> None:
-    """All about the chosen row."""
-    if row.error:
-        wrapped(layout.box(), context, row.error, icon="CANCEL")
+def _draw_heads(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    heads = {name: head for name, head, _, _ in _TABLE}
+    row = layout.row()
+    row.active = False
+    row.scale_y = 0.8
+    for (column, _), place in _split(row, columns_for(width(context), context.scene.fmqm.judge)):
+        place.label(text="LOD" if column == "name" else heads[column])
+
+
+def _beginning(text: str) -> str:
+    """The first sentences; Details has them all."""
+    return ". ".join(text.split(". ")[:_SENTENCES]).removesuffix(".") + "."
+
+
+def _draw_verdict(layout: bpy.types.UILayout, context: bpy.types.Context, fmqm: FMQMScene, row: FMQMRow) -> None:
+    """What an artist wants to know of the chosen row: how bad, by which number, by what, and whether to believe it."""
+    scores, former = row_scores(row), row_former(row)
+    if row.error or scores is None:
+        text = row.error or "This result cannot be read; measure again"
+        wrapped(layout.box(), context, text, icon="CANCEL")
         return
-    scores, stderr = row_scores(row), row_stderr(row)
-    if scores is None:
-        wrapped(layout.box(), context, "This result cannot be read; measure again", icon="CANCEL")
-        return
-    if row.uid in session.stale:
-        wrapped(layout, context, session.stale[row.uid], icon="FILE_REFRESH")
-    column = layout.column(align=True)
-    for name in EXPLAINED:
-        if name == "perceived":
-            column.separator()
-        split = column.split(factor=0.5, align=True)
+    box = layout.box()
+    record = pair_record(pair_of(row)) if is_whole(row) else None
+    if record is not None:
+        heading = record["impairment"]
+        box.label(text=heading[:1].upper() + heading[1:], icon_value=swatch(scores["perceived"]))
+        note = box.column()
+        wrapped(note, context, _beginning(verdict(record)))
+    numbers = box.column(align=True)
+    for judge in Judge:
+        was = "" if former is None else f", was {former[judge.column]:.2f}"
+        split = numbers.split(factor=0.4)
+        split.label(text=EXPLAINED[judge.column][0])
+        split.label(text=f"{scores[judge.column]:.4f}{was}")
+    bars = box.column(align=True)
+    for name in Judge[fmqm.judge].features:
+        split = bars.split(factor=0.5)
         label = split.row()
         label.alignment = "LEFT"
-        label.operator("fmqm.sort_rows", text=EXPLAINED[name][0], emboss=False).column = name
-        error = f" ± {stderr[name]:.4f}" if stderr else ""
-        split.label(text=f"{scores[name]:.4f}{error}")
-    reverse = row_reverse(row)
-    if reverse is not None:
-        for judge in Judge:
-            split = column.split(factor=0.5, align=True)
-            split.label(text=f"    {EXPLAINED[judge.column][0]} Reversed")
-            split.label(text=f"{judge.score(reverse):.4f}")
-    attribution = row_attribution(row)
-    if attribution is not None:
-        for label, key in (("Geometry Loss", "geometry_loss"), ("Texture Loss", "texture_loss")):
-            split = column.split(factor=0.5, align=True)
-            split.label(text=f"    {label}")
-            split.label(text=f"{attribution[key]:.4f}")
-    reference = f"{row.reference_name} (no modifiers)" if row.bare_reference else row.reference_name
-    for label, text in (
-        ("Against", reference),
-        ("Triangles", f"{row.triangles:,} ({row.share:.3g} %)"),
-        ("Space", _SHORT_SPACE.get(row.space, row.space.capitalize())),
-        ("Settings", settings_name(row)),
-        ("Patches", f"{row.patches:,}"),
-        ("Samples", f"{row.samples:,}"),
-        ("Time", f"{row.seconds:.2f} s"),
-    ):
-        split = column.split(factor=0.5, align=True)
-        split.label(text=f"    {label}")
-        split.label(text=text, translate=False)
-    if not all(comparable(row, other) for other in fmqm.rows if row_scores(other)):
-        wrapped(layout, context, "Scores in grey were measured at other settings: do not compare", icon="INFO")
-    if attribution is not None:
-        phrase = attribution["phrase"]
-        wrapped(layout, context, phrase[:1].upper() + phrase[1:], icon="INFO")
-    if is_whole(row):
-        wrapped(layout, context, verdict(pair_record(pair_of(row))), icon="INFO")
+        label.operator(
+            "fmqm.sort_rows", text=EXPLAINED[name][0], emboss=False, icon_value=swatch(scores[name])
+        ).column = name
+        split.progress(factor=scores[name], text=f"{scores[name]:.2f}")
+    if row.uid in session.stale:
+        wrapped(layout, context, session.stale[row.uid], icon="FILE_REFRESH")
+    elif session.get(row.uid) is None:
+        wrapped(layout, context, "Measured in an earlier session: measure again for the heat map", icon="INFO")
+    if is_quick(row):
+        text = f"{row.patches} patches were measured; what lies between is grey. Full gives the score to report"
+        wrapped(layout, context, text, icon="INFO")
     if row.warnings:
         box = layout.box().column()
         for warning in row.warnings.splitlines():

@@ -23,7 +23,7 @@ class FMQM_PT_settings(Sidebar, bpy.types.Panel):  # noqa: N801
     bl_parent_id = "FMQM_PT_main"
     bl_label = "Settings"
     bl_options: ClassVar = {"DEFAULT_CLOSED"}
-    bl_order = 1
+    bl_order = 7
 
     def draw_header_preset(self, _: bpy.types.Context) -> None:
         FMQM_PT_presets.draw_panel_header(self.layout)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-_CHARACTER = 6.6  # pixels at scale 1, of the panel's font, about
+CHARACTER = 6.6  # pixels at scale 1, of the panel's font, about
 
 
 class Sidebar:
@@ -24,10 +24,31 @@ def wrapped(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, i
         first = False
 
 
+def cut_in_the_middle(text: str, room: int) -> str:
+    """A name of at most so many characters: what tells levels apart stands at its end, and what it is at its start."""
+    if len(text) <= room:
+        return text
+    kept = max(room - 1, 2)
+    return f"{text[: kept - kept // 2]}…{text[len(text) - kept // 2 :]}"
+
+
+def short_count(count: int) -> str:
+    """A number of triangles in few characters: 512, 8.7k, 1.2M."""
+    for unit, name in ((1_000_000, "M"), (1_000, "k")):
+        if count >= unit:
+            share = count / unit
+            return f"{share:.1f}{name}" if share < 99.95 else f"{share:.0f}{name}"
+    return f"{count}"
+
+
+def width(context: bpy.types.Context) -> float:
+    """Of the sidebar, in pixels at scale 1."""
+    return float(context.region.width / context.preferences.system.ui_scale)
+
+
 def room(context: bpy.types.Context, margin: int) -> int:
     """How many characters fit beside the margin, in pixels at scale 1."""
-    scale = context.preferences.system.ui_scale
-    return max(12, int((context.region.width / scale - margin) / _CHARACTER))
+    return max(12, int((width(context) - margin) / CHARACTER))
 
 
 def _lines(text: str, room: int) -> list[str]:

@@ -17,7 +17,7 @@ from .sidebar import Sidebar, room, wrapped
 
 class FMQM_PT_trust(Sidebar, bpy.types.Panel):  # noqa: N801
     bl_idname = "FMQM_PT_trust"
-    bl_parent_id = "FMQM_PT_results"
+    bl_parent_id = "FMQM_PT_details"
     bl_label = "Trust"
     bl_description = "What is known of the chosen result: how far to believe its score"
     bl_options: ClassVar = {"DEFAULT_CLOSED"}
@@ -41,8 +41,9 @@ class FMQM_PT_trust(Sidebar, bpy.types.Panel):  # noqa: N801
 
 def _draw_fact(layout: bpy.types.UILayout, context: bpy.types.Context, line: Line) -> None:
     """In one line where there is room for it; else its unit, or why it is not known, goes below, and a long value."""
-    # What reports call distorted is Compared here. One value where both have the same: the sidebar is narrow.
-    label, unit = (text.replace("distorted", "compared") for text in (line.label, line.unit))
+    # What reports call distorted is the LOD here. One value where both have the same: the sidebar is narrow.
+    texts = (line.label, line.unit)
+    label, unit = (text.replace("distorted", "LOD").replace("reference", "original") for text in texts)
     value = " / ".join(dict.fromkeys(line.values))
     if unit.partition(" ")[0] in label.split():  # vertices welded are vertices
         unit = ""

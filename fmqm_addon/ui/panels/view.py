@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sub-panels that show a result in the 3D view: Look, Worst Places, NCF Debugging."""
+"""The sub-panels that show a result in the 3D view: Heat Map, Worst Places, NCF Debugging."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import bpy
 
 from .. import session
 from ..operators.pick import FMQM_OT_unit_pick
+from ..operators.probe import FMQM_OT_probe
 from ..operators.view import (
     FMQM_OT_clear,
-    FMQM_OT_look,
-    FMQM_OT_paint_surface,
+    FMQM_OT_keep,
     FMQM_OT_shells,
     FMQM_OT_slice,
     FMQM_OT_unit_step,
     FMQM_OT_worst_all,
     FMQM_OT_worst_step,
 )
-from ..properties.rows import active_row
+from ..properties.rows import active_row, row_scores
 from ..view.result import look_of
 from .sidebar import Sidebar
 
@@ -43,29 +43,53 @@ class FMQM_UL_worst(bpy.types.UIList):  # noqa: N801
 class FMQM_PT_look(Sidebar, bpy.types.Panel):  # noqa: N801
     bl_parent_id = PARENT
     bl_idname = "FMQM_PT_look"
-    bl_label = "Look"
-    bl_order = 3
+    bl_label = "Heat Map"
+    bl_order = 2
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return has_result(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, look = self.layout, look_of(context.scene)
         layout.use_property_split, layout.use_property_decorate = True, False
         _say_if_gone(layout, context)
+        _switch(layout, look, "show")
         column = layout.column()
+        column.active = look.show != "OFF"
         column.prop(look, "layer")
-        column.row().prop(look, "range", expand=True)
-        column.row().prop(look, "place", expand=True)
-        column.prop(look, "point_size", slider=True)
-        column = layout.column(align=True)
-        column.operator(FMQM_OT_look.bl_idname, icon="POINTCLOUD_DATA")
-        column.operator(FMQM_OT_paint_surface.bl_idname, icon="BRUSH_DATA")
-        layout.operator(FMQM_OT_clear.bl_idname, icon="TRASH")
+        column.prop(look, "range")
+        if look.range == "CUSTOM":
+            pair = column.column(align=True)
+            pair.prop(look, "low", slider=True)
+            pair.prop(look, "high", slider=True)
+        row = column.row(heading="Only Below")
+        row.prop(look, "only_below", text="")
+        number = row.row()
+        number.active = look.only_below
+        number.prop(look, "below", text="", slider=True)
+        column.label(text="Show On")
+        _switch(column, look, "place")
+        if look.show == "POINTS":
+            column.prop(look, "point_size", slider=True)
+        row = layout.row()
+        row.use_property_split = False
+        row.prop(look, "show_after")
+        layout.operator(FMQM_OT_probe.bl_idname, icon="EYEDROPPER")
+        row = layout.row(align=True)
+        row.operator(FMQM_OT_keep.bl_idname, icon="FAKE_USER_ON")
+        row.operator(FMQM_OT_clear.bl_idname, icon="TRASH")
 
 
 class FMQM_PT_worst(Sidebar, bpy.types.Panel):  # noqa: N801
     bl_parent_id = PARENT
     bl_idname = "FMQM_PT_worst"
     bl_label = "Worst Places"
-    bl_order = 4
+    bl_order = 3
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return has_result(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, look = self.layout, look_of(context.scene)
@@ -81,8 +105,12 @@ class FMQM_PT_ncf(Sidebar, bpy.types.Panel):  # noqa: N801
     bl_parent_id = PARENT
     bl_idname = "FMQM_PT_ncf"
     bl_label = "NCF Debugging"
-    bl_order = 5
+    bl_order = 6
     bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return has_result(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, look = self.layout, look_of(context.scene)
@@ -105,6 +133,19 @@ class FMQM_PT_ncf(Sidebar, bpy.types.Panel):  # noqa: N801
         column.prop(look, "shell_distance")
         column.prop(look, "shell_points")
         column.operator(FMQM_OT_shells.bl_idname, icon="MOD_THICKNESS")
+
+
+def has_result(context: bpy.types.Context) -> bool:
+    """Whether the chosen row has something to show; panels that have not are absent."""
+    row = active_row(context.scene)
+    return row is not None and row_scores(row) is not None
+
+
+def _switch(layout: bpy.types.UILayout, look: Any, name: str) -> None:
+    """A choice of buttons over the whole width, where their names are not cut."""
+    row = layout.row()
+    row.use_property_split = False
+    row.prop(look, name, expand=True)
 
 
 def _say_if_gone(layout: Any, context: bpy.types.Context) -> None:

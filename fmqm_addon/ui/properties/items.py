@@ -10,12 +10,13 @@ from bpy.props import (
     PointerProperty,
 )
 
+from ...blender.display.scene_objects import TAG
 from ...blender.scene.members import is_measured
 
 
 def is_asset(object_: bpy.types.Object) -> bool:
     """Whether an object can be measured: it may show a surface, or it stands for what hangs from it. Cheap."""
-    return object_.type in {"EMPTY", "ARMATURE"} or is_measured(object_)
+    return TAG not in object_ and (object_.type in {"EMPTY", "ARMATURE"} or is_measured(object_))  # nothing of ours
 
 
 def can_be_picked(_: Any, object_: bpy.types.Object) -> bool:

@@ -23,30 +23,33 @@ from ...report.records import PERCEIVED, SHOWN, PairScore, pair_record
 from ...report.trust_table import Report
 from .. import stored_text
 
+PRESET_LABELS = {"paper": "Full", "fast": "Quick"}
+assert set(PRESET_LABELS) == set(PRESETS)
+
 # What an artist should know of each number: label, and what a low value looks like.
 EXPLAINED = {
-    "FMQM": ("FMQM", "The paper's score, 0 to 1: mean over all patches. 1 is the same as the reference"),
+    "FMQM": ("FMQM", "The paper's score, 0 to 1: mean over all patches. 1 is the same as the original"),
     "geoSSIM": (
-        "Shape",
-        "geoSSIM: distances to the surface. Low where the surface has moved, shrunk or lost its bumps",
+        "geoSSIM",
+        "Shape: distances to the surface. Low where the surface has moved, shrunk or lost its bumps",
     ),
     "geoGraSSIM": (
-        "Direction",
-        "geoGraSSIM: directions to the surface. Low where it is bent or faceted, so that its normals point elsewhere",
+        "geoGraSSIM",
+        "Facing: directions to the surface. Low where it is bent or faceted, so that its normals point elsewhere",
     ),
     "colorSSIM": (
-        "Color",
-        "colorSSIM: colors around a point. Low where the texture is blurred, shifted, tinted or compressed",
+        "colorSSIM",
+        "Color: colors around a point. Low where the texture is blurred, shifted, tinted or compressed",
     ),
     "colorGraSSIM": (
-        "Color Edges",
-        "colorGraSSIM: the steepest color changes. Low where edges in the texture have moved, softened or broken up",
+        "colorGraSSIM",
+        "Detail: the steepest color changes. Low where edges in the texture have moved, softened or broken up",
     ),
     "perceived": ("Perceived", "Whether people would see it, 0 to 1: mean over all patches. 1 is the same"),
-    "shape": ("Shape", "shape: distances to the surface. Low where the surface has moved, shrunk or lost its bumps"),
-    "facing": ("Facing", "facing: directions to the surface. Low where it is bent or faceted, and shades otherwise"),
-    "color": ("Color", "color: colors around a point. Low where colors or contrasts have changed visibly"),
-    "detail": ("Detail", "detail: slopes of the colors. Low where the texture is blurred, moved or broken up"),
+    "shape": ("Shape", "Distances to the surface. Low where the surface has moved, shrunk or lost its bumps"),
+    "facing": ("Facing", "Directions to the surface. Low where it is bent or faceted, and shades otherwise"),
+    "color": ("Color", "Colors around a point. Low where colors or contrasts have changed visibly"),
+    "detail": ("Detail", "Slopes of the colors. Low where the texture is blurred, moved or broken up"),
     "perceived_p10": ("Worst Tenth", "A tenth of the patches has a perceived quality below this"),
 }
 assert set(EXPLAINED) == {*SHOWN, *PERCEIVED}
@@ -57,14 +60,15 @@ class FMQMRow(bpy.types.PropertyGroup):
 
     name: StringProperty(name="Name", description="Object or collection that was compared")
     uid: StringProperty(name="Identifier", description="Key of the fields that this Blender session remembers")
-    reference_name: StringProperty(name="Reference", description="What it was compared with")
+    reference_name: StringProperty(name="Original", description="What it was compared with")
     kind: StringProperty(name="Kind", description="Whether it is an object or a collection")
-    reference_kind: StringProperty(name="Reference Kind", description="Whether the reference is one or the other")
-    bare_reference: BoolProperty(name="Bare Reference", description="The reference was measured without modifiers")
+    reference_kind: StringProperty(name="Original Kind", description="Whether the original is one or the other")
+    bare_reference: BoolProperty(name="Bare Reference", description="The original was measured without modifiers")
     scores: StringProperty(name="Scores", description="FMQM, perceived and their errors in double precision, as JSON")
-    triangles: IntProperty(name="Triangles", description="Triangles of the compared object", min=0)
+    former: StringProperty(name="Former Scores", description="As Scores, of the measurement before; empty: none")
+    triangles: IntProperty(name="Triangles", description="Triangles of the LOD", min=0)
     share: FloatProperty(
-        name="Share", description="Its triangles by those of the reference", min=0.0, subtype="PERCENTAGE"
+        name="Share", description="Its triangles by those of the original", min=0.0, subtype="PERCENTAGE"
     )
     patches: IntProperty(name="Patches", description="Patches that were scored", min=0)
     samples: IntProperty(name="Samples", description="Samples that were drawn", min=0)
@@ -78,7 +82,7 @@ class FMQMRow(bpy.types.PropertyGroup):
     reverse: StringProperty(name="Reverse", description="As Scores, of the other direction; empty: not measured")
     attribution: StringProperty(name="Attribution", description="Whose loss it is, as JSON; empty: not measured")
     trust: StringProperty(name="Trust", description="How far to trust the scores: facts with their units, as JSON")
-    parts: StringProperty(name="Parts", description="Scores of the reference's parts, as JSON")
+    parts: StringProperty(name="Parts", description="Scores of the original's parts, as JSON")
     fingerprint: StringProperty(name="Fingerprint", description="Tells whether what was measured has changed since")
 
 
@@ -115,6 +119,12 @@ def row_stderr(row: FMQMRow) -> dict[str, float] | None:
     return _numbers(readings.stderr, readings.perceived_stderr)
 
 
+def row_former(row: FMQMRow) -> dict[str, float] | None:
+    """row_scores of the measurement before, at equal settings; None where there was none."""
+    readings = stored_text.read_readings(row.former)
+    return None if readings is None else _numbers(readings.scores, readings.perceived)
+
+
 def row_reverse(row: FMQMRow) -> Readings | None:
     """Readings of the other direction, the compared as the reference; None where they were not measured."""
     return stored_text.read_readings(row.reverse)
@@ -147,8 +157,14 @@ def settings_name(row: FMQMRow) -> str:
     for name, values in PRESETS.items():
         preset = Settings(**values).as_dict()
         if all(preset[each] == value for each, value in used.items()):
-            return name.capitalize()
+            return PRESET_LABELS[name]
     return "Custom"
+
+
+def is_quick(row: FMQMRow) -> bool:
+    """Whether only some of the patches were scored."""
+    used = stored_text.read_settings(row.settings)
+    return used is not None and used["scored_patches"] is not None and row.patches < used["patches"]
 
 
 def comparable(row: FMQMRow, other: FMQMRow) -> bool:
@@ -166,6 +182,7 @@ def is_whole(row: FMQMRow) -> bool:
     readers = (
         (row.scores, stored_text.read_readings),
         (row.reverse, stored_text.read_readings),
+        (row.former, stored_text.read_readings),
         (row.attribution, stored_text.read_attribution),
         (row.trust, stored_text.read_trust),
         (row.parts, stored_text.read_parts),

@@ -24,34 +24,34 @@ class FMQMScene(bpy.types.PropertyGroup):
     """Inputs, settings, results and the look of them."""
 
     reference_kind: EnumProperty(
-        name="Reference Kind",
-        description="What the reference is",
+        name="Original Kind",
+        description="What the original is",
         items=[
             ("OBJECT", "Object", "An object with a surface, or an empty with all below it", "OBJECT_DATA", 0),
             ("COLLECTION", "Collection", "All objects of a collection", "OUTLINER_COLLECTION", 1),
         ],
     )
     reference: PointerProperty(
-        name="Reference",
-        description="The original. An empty stands for all below it",
+        name="Original",
+        description="The finest version. An empty stands for all below it",
         type=bpy.types.Object,
         poll=can_be_picked,
     )
     reference_collection: PointerProperty(
-        name="Reference Collection",
-        description="The original: all objects of the collection as one",
+        name="Original Collection",
+        description="The finest version: all objects of the collection as one",
         type=bpy.types.Collection,
     )
     bare_reference: BoolProperty(
         name="Without Modifiers",
-        description="The reference is its mesh without modifiers. With the same object in the list, "
+        description="The original is its mesh without modifiers. With the same object in the list, "
         "this shows what its modifiers do",
         default=False,
     )
-    compared: CollectionProperty(name="Compared", description="What is scored against the reference", type=FMQMItem)
-    compared_index: IntProperty(name="Active Compared", description="Chosen row of the list", default=0, min=0)
+    compared: CollectionProperty(name="LODs", description="What is scored against the original", type=FMQMItem)
+    compared_index: IntProperty(name="Active LOD", description="Chosen row of the list", default=0, min=0)
     settings: PointerProperty(name="Settings", description="How it is measured", type=FMQMSettings)
-    rows: CollectionProperty(name="Results", description="One row per compared object", type=FMQMRow)
+    rows: CollectionProperty(name="Results", description="One row per LOD", type=FMQMRow)
     row_index: IntProperty(
         name="Active Result", description="Chosen row of the results", default=0, min=0, update=notify("row_index")
     )

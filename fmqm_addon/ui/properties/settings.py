@@ -74,8 +74,8 @@ class FMQMSettings(bpy.types.PropertyGroup):
         name="Preset",
         description="Values of all settings at once. Compare scores only at equal settings",
         items=[
-            ("PAPER", "Paper", "The paper's values: the score to report"),
-            ("FAST", "Fast", f"A quick look: {FAST_SCORED_PATCHES} patches, spread evenly, at full density"),
+            ("PAPER", "Full", "The paper's values: the score to report"),
+            ("FAST", "Quick", f"A quick look: {FAST_SCORED_PATCHES} patches, spread evenly, at full density"),
             (CUSTOM, "Custom", "Values of your own"),
         ],
         default="PAPER",
@@ -131,7 +131,7 @@ class FMQMSettings(bpy.types.PropertyGroup):
         items=[
             ("AUTO", "Auto", "Where they stand, unless they overlap far better side by side or without transforms"),
             ("WORLD", "World", "Where they stand in the scene"),
-            ("LOCAL", "Local", "Without their transforms: each moved onto the reference by its own origin and axes"),
+            ("LOCAL", "Local", "Without their transforms: each moved onto the original by its own origin and axes"),
         ],
         default=PairOptions.space.upper(),
     )
@@ -141,7 +141,7 @@ class FMQMSettings(bpy.types.PropertyGroup):
         description="What refines the placement",
         items=[
             ("NONE", "Nothing", "Each stands where Space has put it"),
-            ("ICP", "Closest Points", "Rigidly onto the reference's nearest points: for scans a little askew"),
+            ("ICP", "Closest Points", "Rigidly onto the original's nearest points: for scans a little askew"),
         ],
         default=PairOptions.align.upper(),
     )

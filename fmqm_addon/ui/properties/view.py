@@ -46,24 +46,53 @@ class FMQMWorstPatch(bpy.types.PropertyGroup):
 class FMQMLook(bpy.types.PropertyGroup):
     """What of the chosen result is shown, and how."""
 
-    layer: EnumProperty(
-        name="Color By", description="What the colors of the points mean", items=_LAYER_ITEMS, update=notify("layer")
+    show: EnumProperty(
+        name="Heat Map",
+        description="How the chosen result is drawn over the view. It is no data of the file: it cannot be selected, "
+        "rendered, exported or saved, and changes nothing else",
+        items=[
+            ("OFF", "Off", "The objects look as ever"),
+            ("SURFACE", "Surface", "Colors on the original and the LOD themselves, by the nearest patch"),
+            ("POINTS", "Points", "The samples as points, for a close look at the fields"),
+        ],
+        update=notify("show"),
     )
+    show_after: BoolProperty(
+        name="Show After Measuring", description="When a measurement ends, the heat map appears", default=True
+    )
+    layer: EnumProperty(name="Color By", description="What the colors mean", items=_LAYER_ITEMS, update=notify("layer"))
     range: EnumProperty(
         name="Range",
         description="Which values the ends of the color map stand for",
         items=[
-            ("FIXED", "Fixed", "0 to 1 for scores and colors; 1 or 2 % of the reference's size for distances"),
-            ("FITTED", "Fitted", "The values that occur, so that small differences show"),
+            ("FITTED", "Fitted", "Scores from their 5th percentile over all results to 1; other values as they occur"),
+            ("CUSTOM", "Custom", "Ends of your own for scores; the probe drags them in the legend"),
+            ("FIXED", "Fixed", "0 to 1 for scores and colors; 1 or 2 % of the original's size for distances"),
         ],
         update=notify("range"),
     )
+    low: FloatProperty(
+        name="Low", description="Score at the hot end", default=0.5, min=0.0, max=0.999, step=1, precision=3,
+        update=notify("range"),
+    )  # fmt: skip
+    high: FloatProperty(
+        name="High", description="Score at the dark end", default=1.0, min=0.001, max=1.0, step=1, precision=3,
+        update=notify("range"),
+    )  # fmt: skip
+    only_below: BoolProperty(
+        name="Only Below", description="Show only patches with a lower score", default=False, update=notify("show")
+    )
+    below: FloatProperty(
+        name="Below", description="Patches above this score are not shown", default=0.8, min=0.0, max=1.0, step=1,
+        precision=3, update=notify("show"),
+    )  # fmt: skip
     place: EnumProperty(
-        name="Place",
-        description="Where the points are shown",
+        name="Show On",
+        description="Where the heat map is shown",
         items=[
-            ("REFERENCE", "Reference", "Where the reference stands"),
-            ("COMPARED", "Compared", "Where the compared object stands"),
+            ("BOTH", "Both", "On the original and on the LOD"),
+            ("REFERENCE", "Original", "On the original"),
+            ("COMPARED", "LOD", "On the LOD"),
         ],
         update=notify("place"),
     )
@@ -76,7 +105,7 @@ class FMQMLook(bpy.types.PropertyGroup):
     worst: CollectionProperty(name="Worst Places", description="The patches of the lowest scores", type=FMQMWorstPatch)
     worst_index: IntProperty(
         name="Worst Place",
-        description="Frames this patch and shows only its points",
+        description="Frames this patch and shows only it",
         min=0,
         update=notify("worst_index"),
     )
@@ -86,8 +115,8 @@ class FMQMLook(bpy.types.PropertyGroup):
         name="Surface",
         description="Whose colors the shells show",
         items=[
-            ("REFERENCE", "Reference", "Colors of the reference around it"),
-            ("COMPARED", "Compared", "Colors of the compared object around it"),
+            ("REFERENCE", "Original", "Colors of the original around it"),
+            ("COMPARED", "LOD", "Colors of the LOD around it"),
         ],
     )
     shell_layout: EnumProperty(
@@ -100,7 +129,7 @@ class FMQMLook(bpy.types.PropertyGroup):
     )
     shell_distance: FloatProperty(
         name="Distance",
-        description="Between two shells, in percent of the reference's size",
+        description="Between two shells, in percent of the original's size",
         default=2.0, min=0.001, max=100.0, soft_max=10.0, step=10, precision=2, subtype="PERCENTAGE",
     )  # fmt: skip
     shell_points: IntProperty(

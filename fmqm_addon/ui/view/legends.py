@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from typing import Any
 
 import bpy
 
 from ...metric.evaluation import Result
 from ...report.visual import layers
-from . import overlay
+
+LEGEND = "fmqm_legend"  # custom property of the objects that have a legend: report.visual.layers.Legend as JSON
 
 
 def explain(
@@ -23,8 +24,15 @@ def explain(
     note: str = "",
 ) -> None:
     """Stores the legend on the object, where drawing, saving and undo find it."""
-    legend = layers.legend(layer, ends, name, result, lambda length: length_text(scene, length))
-    object_[overlay.LEGEND] = json.dumps(replace(legend, note=note or legend.note).as_dict())
+    legend = legend_of(scene, layer, ends, result, name)
+    object_[LEGEND] = json.dumps(legend | {"note": note or legend["note"]})
+
+
+def legend_of(
+    scene: bpy.types.Scene, layer: str, ends: tuple[float, float], result: Result, name: str
+) -> dict[str, Any]:
+    """The legend of a layer between two ends, as report.visual.layers.Legend.as_dict has it."""
+    return layers.legend(layer, ends, name, result, lambda length: length_text(scene, length)).as_dict()
 
 
 def length_text(scene: bpy.types.Scene, length: float) -> str:

@@ -22,11 +22,13 @@ from ...metric.geometry import Floats
 from .. import session
 from ..properties.rows import active_row
 from ..stored_text import read_legend
+from . import heat, shells
+from .legends import LEGEND
 
-LEGEND = "fmqm_legend"  # custom property of the objects that have a legend: report.visual.layers.Legend as JSON
 _FONT = 0
 _MARGIN, _PAD, _LINE, _GAP = 14, 10, 17, 8  # pixels at a UI scale of 1
 _BAR_WIDTH, _BAR_HEIGHT, _TICK = 14, 150, 4
+_COUNTS = 46  # of the histogram beside the bar
 _PANEL = 128  # side of one of the figure's four pictures
 _DOT = 2.6
 _OPACITY = 0.9
@@ -66,7 +68,18 @@ class UnitFigure:
     batches: list[Any] = field(default_factory=list)  # made when first drawn: only there is a GPU context
 
 
+@dataclass(frozen=True)
+class Hint:
+    """Lines beside the mouse. area: the pointer of the one it is in. at: pixels of its main region."""
+
+    area: int
+    at: tuple[float, float]
+    lines: tuple[str, ...]
+
+
 figure: UnitFigure | None = None
+hint: Hint | None = None
+bars: dict[int, tuple[float, float, float, float]] = {}  # by area: x, y, width and height of the heat map's color bar
 on_draw: Callable[[], None] | None = None  # called before each drawing: has the slice been moved?
 _handles: list[Any] = []
 
@@ -75,7 +88,7 @@ def register() -> None:
     if bpy.app.background:
         return  # nothing will ever be drawn
     add = bpy.types.SpaceView3D.draw_handler_add
-    _handles.append(add(_draw_marks, (), "WINDOW", "POST_VIEW"))
+    _handles.append(add(_draw_in_space, (), "WINDOW", "POST_VIEW"))
     _handles.append(add(_draw_legends, (), "WINDOW", "POST_PIXEL"))
 
 
@@ -87,14 +100,14 @@ def unregister() -> None:
 
 
 def legends() -> list[dict[str, Any]]:
-    """The legends of our objects that this view shows."""
-    space = bpy.context.space_data
-    shown: list[dict[str, Any]] = []
-    for object_ in scene_objects.objects(bpy.context.scene):
+    """The legends of what this view shows."""
+    space, scene = bpy.context.space_data, bpy.context.scene
+    shown: list[dict[str, Any]] = [*heat.legends(scene, space), *shells.legends(scene, space)]
+    for object_ in scene_objects.objects(scene):
         if LEGEND in object_ and object_.visible_get(viewport=space):
             text = object_[LEGEND]
             legend = read_legend(text) if isinstance(text, str) else None
-            if legend is not None and legend not in shown:  # points and painted surface share theirs
+            if legend is not None:
                 shown.append(legend)
     return shown
 
@@ -107,10 +120,13 @@ def _draw_legends() -> None:
         return
     ink = _Ink()
     x, y = _corner(ink)
+    bars.pop(bpy.context.area.as_pointer(), None)
     for legend in legends():
         x += _draw_legend(ink, legend, x, y) + ink.px(_GAP)
     if figure is not None and belongs_here(figure):
         _draw_figure(ink, figure, x, y)
+    if hint is not None and hint.area == bpy.context.area.as_pointer():
+        _draw_hint(ink, hint)
 
 
 def belongs_here(shown: UnitFigure) -> bool:
@@ -168,7 +184,8 @@ def _draw_legend(ink: _Ink, legend: dict[str, Any], x: float, y: float) -> float
     bar, swatches = legend["bar"], legend["swatches"]
     marked = [legend["mark"]] if legend["mark"] else []
     texts = [legend["title"], legend["subtitle"], legend["note"]]
-    beside = px(_BAR_WIDTH + _TICK + 5)
+    counts = legend.get("histogram", [])
+    beside = px(_BAR_WIDTH + _TICK + 5 + (_COUNTS if counts else 0))
     width = max(
         *(ink.width(text) for text in texts),
         *(beside + ink.width(text) for _, text in legend["ticks"]),
@@ -185,7 +202,11 @@ def _draw_legend(ink: _Ink, legend: dict[str, Any], x: float, y: float) -> float
     ink.write(legend["subtitle"], left, top - px(12) - line, ink.faint)
     top -= 2 * line
     if bar:
-        _draw_bar(ink, legend, left, top - line * 0.7 - px(_BAR_HEIGHT))
+        place = (left + px(_COUNTS if counts else 0), top - line * 0.7 - px(_BAR_HEIGHT))
+        if counts:
+            _draw_counts(ink, counts, *place)
+            bars[bpy.context.area.as_pointer()] = (*place, px(_BAR_WIDTH), px(_BAR_HEIGHT))
+        _draw_bar(ink, legend, *place)
     for color, text in swatches:
         _box(left, top - px(13), px(_BAR_WIDTH), px(11), (*color, 1.0))
         ink.write(text, left + px(_BAR_WIDTH + 6), top - px(12))
@@ -193,6 +214,25 @@ def _draw_legend(ink: _Ink, legend: dict[str, Any], x: float, y: float) -> float
     if legend["note"]:
         ink.write(legend["note"], left, y + pad + px(2), ink.faint)
     return float(width + 2 * pad)
+
+
+def _draw_counts(ink: _Ink, counts: list[float], x: float, y: float) -> None:
+    """How many patches have each value, as bars to the left of the color bar, whose lower left corner is given."""
+    step = ink.px(_BAR_HEIGHT) / len(counts)
+    for number, count in enumerate(counts):
+        length = count * ink.px(_COUNTS - 4)
+        _box(x - ink.px(2) - length, y + number * step, length, max(step - 1, 1), ink.faint)
+
+
+def _draw_hint(ink: _Ink, shown: Hint) -> None:
+    pad, line = ink.px(_PAD), ink.px(_LINE)
+    width, height = max(map(ink.width, shown.lines)) + 2 * pad, len(shown.lines) * line + 2 * pad
+    region = bpy.context.region
+    x = min(shown.at[0] + ink.px(16), region.width - width)
+    y = min(max(shown.at[1] - height, 0), region.height - height)
+    _box(x, y, width, height, ink.back)
+    for number, text in enumerate(shown.lines):
+        ink.write(text, x + pad, y + height - pad - line * number - ink.px(12), None if number < 2 else ink.faint)
 
 
 def _draw_bar(ink: _Ink, legend: dict[str, Any], x: float, y: float) -> None:
@@ -223,7 +263,7 @@ def _draw_figure(ink: _Ink, shown: UnitFigure, x: float, y: float) -> None:
     width, height = label + 2 * side + 3 * pad, 2 * side + 2 * line + 3 * pad
     _box(x, y, width, height, ink.back)
     ink.write(shown.title, x + pad, y + height - pad - px(12))
-    for column, text in enumerate(("Reference", "Compared")):
+    for column, text in enumerate(("Original", "LOD")):
         ink.write(text, x + pad + label + column * (side + pad), y + height - pad - px(12) - line, ink.faint)
     if not shown.batches:
         shown.batches.extend(_picture_batch(picture) for picture in shown.pictures)
@@ -261,6 +301,13 @@ def _picture_batch(picture: UnitPicture) -> Any:
     shader = gpu.shader.from_builtin("SMOOTH_COLOR")
     flat = np.column_stack([positions, np.zeros(len(positions))]).astype(np.float32)
     return batch_for_shader(shader, "TRIS", {"pos": flat, "color": colors.astype(np.float32)})
+
+
+def _draw_in_space() -> None:
+    """What stands in the scene's space: the heat map and the shells, and the marks of the figure over them."""
+    heat.draw()
+    shells.draw()
+    _draw_marks()
 
 
 def _draw_marks() -> None:

@@ -6,7 +6,6 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ...blender.display import scene_objects, viewport
 from ...metric.errors import FMQMError
 from ...metric.geometry import Floats
 from .. import session
@@ -38,18 +37,13 @@ def measured_row(scene: bpy.types.Scene) -> tuple[str, str, session.Measured]:
     return row.uid, row.name, measured
 
 
-def measured_of(shown: bpy.types.Object | None) -> session.Measured | None:
-    """What an object of ours was made from, if that is still in memory."""
-    return None if shown is None else session.get(shown.get(UID, ""))
-
-
 def world_matrix(measured: session.Measured, place: str) -> Floats:
-    """(4, 4) from the metric's frame to where a row's reference, or its compared object, stands."""
+    """(4, 4) from the metric's frame to where a row's compared object (COMPARED) or its reference stands."""
     frame = measured.reference.frame
     into = np.eye(4)
     into[:3, :3] *= frame.scale
     into[:3, 3] = frame.center
-    to_world = measured.reference_to_world if place == "REFERENCE" else measured.distorted_to_world
+    to_world = measured.distorted_to_world if place == "COMPARED" else measured.reference_to_world
     matrix: Floats = np.asarray(to_world, np.float64) @ into
     return matrix
 
@@ -58,9 +52,3 @@ def world_length(measured: session.Measured) -> float:
     """Scene units of the metric's unit, the reference's diagonal."""
     matrix = world_matrix(measured, "REFERENCE")
     return float(np.cbrt(abs(np.linalg.det(matrix[:3, :3]))))
-
-
-def appear(object_: bpy.types.Object) -> None:
-    bpy.context.view_layer.update()
-    scene_objects.reveal(object_, bpy.context.view_layer)
-    viewport.show_in_local_views(object_)

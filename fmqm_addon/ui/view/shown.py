@@ -4,17 +4,13 @@
 from __future__ import annotations
 
 import bpy
-from mathutils import Matrix
 
 from ...blender.display import scene_objects, viewport
 from ...comparison.judge import Judge
 from .. import session
 from ..properties.rows import active_row
-from . import overlay, worst
-from .cloud import build_cloud, show_all_patches
-from .painted import build_painted, keep_fields
-from .result import UID, look_of, measured_of, measured_row, world_matrix
-from .shells import build_shells
+from . import heat, overlay, shells, worst
+from .result import UID, look_of, measured_row
 from .slice_plane import draw_slice
 from .units import follow_unit
 
@@ -23,22 +19,18 @@ def follow_row(scene: bpy.types.Scene) -> None:
     """What is shown becomes that of the row just chosen or measured; hidden things stay hidden.
 
     Raises:
-        FMQMError: the row has nothing to show. The list of worst places is empty then, the rest stays.
+        FMQMError: the row has nothing to show. The list of worst places is empty then.
     """
     look, row = look_of(scene), active_row(scene)
     if row is None or row.uid != look.worst_uid:
         worst.forget_worst(look)
+        look.focused = False
+    heat.refresh(scene)
     uid, _, measured = measured_row(scene)
-    builders = {
-        scene_objects.CLOUD: build_cloud,
-        scene_objects.PAINTED: build_painted,
-        scene_objects.SHELLS: build_shells,
-        scene_objects.SLICE: draw_slice,
-    }
-    for kind, build in builders.items():
-        shown = scene_objects.find_object(scene, kind)
-        if shown is not None and shown.get(UID) != uid:
-            build(scene)
+    plane = scene_objects.find_object(scene, scene_objects.SLICE)
+    if plane is not None and plane.get(UID) != uid:
+        draw_slice(scene)
+    shells.follow_shells(scene)
     worst.fill_worst(look, measured.comparison.result, uid)
     follow_unit(scene)
 
@@ -53,29 +45,35 @@ def follow_judge(scene: bpy.types.Scene) -> None:
     worst.forget_worst(look)
     if look.layer in [judge.column for judge in Judge]:
         look.layer = Judge[scene.fmqm.judge].column
+    look.focused = False
     follow_row(scene)
-    if look.focused:
-        show_all_patches(scene)
 
 
-def move_shown(scene: bpy.types.Scene) -> None:
+def follow_place(scene: bpy.types.Scene) -> None:
     """Moves what is shown to the place that the look says."""
-    for kind in (scene_objects.CLOUD, scene_objects.PAINTED, scene_objects.SHELLS):
-        shown = scene_objects.find_object(scene, kind)
-        measured = measured_of(shown)
-        if shown is not None and measured is not None:
-            shown.matrix_world = Matrix(world_matrix(measured, look_of(scene).place).tolist())
+    heat.refresh(scene)
+    shells.follow_shells(scene)
     follow_unit(scene)
 
 
+def show_heat_map(scene: bpy.types.Scene) -> None:
+    """After measuring: the heat map of the chosen row, unless the user wants none or sees something already."""
+    look = look_of(scene)
+    if look.show_after and look.show == heat.OFF:
+        look.show = heat.SURFACE
+    heat.refresh(scene)
+
+
 def clear() -> int:
-    """Removes all of it from the file and gives the views their settings back; how many data-blocks there were."""
+    """Takes all of it away, and the views back to where they were; how many data-blocks there were."""
     overlay.figure = None
-    keep_fields(set())
+    shells.shown.clear()
     for scene in bpy.data.scenes:
-        look_of(scene).focused = False
+        look = look_of(scene)
+        look.focused, look.show = False, heat.OFF
+    heat.build_all()
+    viewport.unframe()
     count = scene_objects.clear()
-    viewport.restore_colors()
     viewport.redraw()
     return count
 
@@ -84,18 +82,12 @@ def forget_removed() -> None:
     """Lets go of the arrays of rows that no scene has any more; undo brings such a row back without them. Cheap."""
     uids = {row.uid for scene in bpy.data.scenes for row in scene.fmqm.rows}
     session.keep(uids)
-    keep_fields(uids)
+    heat.keep(uids)
+    shells.keep(uids)
     if overlay.figure is not None and overlay.figure.uid not in uids:
         overlay.figure = None
 
 
-def settle_colors() -> None:
-    """After undo and redo, which leave the views' settings as they are: these follow what is shown now."""
-    if not scene_objects.anything_colored():
-        viewport.restore_colors()
-    elif not viewport.colors_changed():  # else they are what they were, but for what the user has chosen since
-        viewport.show_colors()
-
-
 def anything() -> bool:
-    return overlay.figure is not None or scene_objects.anything() or viewport.colors_changed()
+    shown = any(look_of(scene).show != heat.OFF for scene in bpy.data.scenes)
+    return shown or bool(shells.shown) or overlay.figure is not None or scene_objects.anything()

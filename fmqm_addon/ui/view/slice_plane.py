@@ -11,7 +11,7 @@ from ...blender.display import scene_objects, viewport
 from ...report.visual import layers
 from ...report.visual.shells import fields_at, slice_points
 from .legends import explain
-from .result import UID, appear, look_of, measured_row, world_length, world_matrix
+from .result import UID, look_of, measured_row, world_length, world_matrix
 
 SLICE_SIZE = 1.2  # in the longest side of the reference's box
 OUTLINE = 0.05  # encoded grey of the surface's cut in a slice
@@ -33,7 +33,9 @@ def show_slice(scene: bpy.types.Scene) -> bpy.types.Object:
     matrix[:3, :3] = side * np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])  # faces the front, -Y
     matrix[:3, 3] = (low + high) / 2
     plane = scene_objects.build_slice(scene, "FMQM Slice", matrix, int(look_of(scene).slice_resolution))
-    appear(plane)
+    bpy.context.view_layer.update()
+    scene_objects.reveal(plane, bpy.context.view_layer)
+    viewport.show_in_local_views(plane)
     draw_slice(scene)
     return plane
 
@@ -56,13 +58,13 @@ def draw_slice(scene: bpy.types.Scene) -> None:
     dist = fields_at(measured.comparison.distorted, points)
     length = world_length(measured)
     values = layers.field_values(look.slice_layer, ref, dist, length)
-    ends = layers.value_range(look.slice_layer, values, look.range == "FITTED", length)
+    ends = layers.value_range(look.slice_layer, values, look.range != "FIXED", length)
     colors = layers.layer_colors(look.slice_layer, values, *ends).copy()
     cut = dist.sdf if look.slice_layer.endswith("COMPARED") else ref.sdf
     colors[_borders((cut < 0).reshape(resolution, resolution)).ravel()] = OUTLINE
     scene_objects.draw_slice(plane, colors)
     plane[UID], plane[_SLICE_MATRIX] = uid, _flat(plane)
-    which = "compared" if look.slice_layer.endswith("COMPARED") else "reference"
+    which = "LOD" if look.slice_layer.endswith("COMPARED") else "original"
     explain(scene, plane, look.slice_layer, ends, measured.comparison.result, name, f"dark line: {which}")
     viewport.redraw()
 

@@ -11,7 +11,7 @@ import bpy
 from ...blender.display import scene_objects
 from ...metric.errors import FMQMError
 from ..properties import view as properties
-from . import cloud, overlay, painted, shown, slice_plane, worst
+from . import heat, overlay, shown, slice_plane, worst
 
 _SLICE_REST = 0.12  # seconds after which a moved slice is drawn again
 
@@ -21,15 +21,10 @@ def _on_change(scene: bpy.types.Scene, name: str, context: bpy.types.Context) ->
     with suppress(FMQMError):
         if name == "worst_index":
             if not worst.choosing:
-                cloud.focus_patch(scene, context.area)
+                worst.focus_patch(scene, context.area)
             return
         for update in _UPDATES[name]:
             update(scene)
-
-
-def _recolor(scene: bpy.types.Scene) -> None:
-    cloud.recolor_cloud(scene)
-    painted.recolor_painted(scene)
 
 
 def _rebuild_slice(scene: bpy.types.Scene) -> None:
@@ -40,19 +35,23 @@ def _rebuild_slice(scene: bpy.types.Scene) -> None:
 _UPDATES: dict[str, tuple[Callable[[bpy.types.Scene], object], ...]] = {
     "row_index": (shown.follow_row,),
     "judge": (shown.follow_judge,),
-    "layer": (_recolor,),
-    "range": (_recolor, slice_plane.draw_slice),
-    "place": (shown.move_shown,),
-    "point_size": (cloud.resize_cloud,),
+    "show": (heat.refresh,),
+    "layer": (heat.refresh,),
+    "range": (heat.refresh, slice_plane.draw_slice),
+    "place": (shown.follow_place,),
+    "point_size": (heat.refresh,),
     "slice_layer": (slice_plane.draw_slice,),
     "slice_resolution": (_rebuild_slice,),
 }
 
 
-def _watch_slice() -> None:
+def _watch() -> None:
     """Called at each drawing of a view; the work waits for a timer, outside of the drawing."""
-    if slice_plane.slice_has_moved(bpy.context.scene) and not bpy.app.timers.is_registered(_redraw_slice):
+    scene = bpy.context.scene
+    if slice_plane.slice_has_moved(scene) and not bpy.app.timers.is_registered(_redraw_slice):
         bpy.app.timers.register(_redraw_slice, first_interval=_SLICE_REST)
+    if not heat.is_current(scene) and not bpy.app.timers.is_registered(heat.build_all):
+        bpy.app.timers.register(heat.build_all, first_interval=0)
 
 
 def _redraw_slice() -> None:
@@ -65,7 +64,7 @@ def _redraw_slice() -> None:
 def register() -> None:
     properties.on_change = _on_change
     overlay.register()
-    overlay.on_draw = _watch_slice
+    overlay.on_draw = _watch
 
 
 def unregister() -> None:
@@ -73,5 +72,6 @@ def unregister() -> None:
     overlay.on_draw = None
     overlay.unregister()
     properties.on_change = None
-    if bpy.app.timers.is_registered(_redraw_slice):
-        bpy.app.timers.unregister(_redraw_slice)
+    for timer in (_redraw_slice, heat.build_all):
+        if bpy.app.timers.is_registered(timer):
+            bpy.app.timers.unregister(timer)

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from fmqm_addon.blender.display import scene_objects, viewport
+from fmqm_addon.blender.display import scene_objects
 from fmqm_addon.metric.colorspace import decode_srgb
 from tests.blender import scenes
 
@@ -60,18 +60,6 @@ def test_colors_are_linear_and_one_a_point() -> None:
         scene_objects.recolor(made, np.zeros((5, 3)))
 
 
-def test_points_grow_and_vanish_in_place() -> None:
-    made = cloud()
-    scene_objects.resize(made, 0.3, np.array([True, False, True]))
-    corners = vertices(made).reshape(-1, 4, 3)
-    assert np.linalg.norm(corners - POSITIONS[:, None], axis=2)[0] == pytest.approx(0.3)
-    assert (corners[1] == corners[1, 0]).all()
-    scene_objects.resize(made, 0.2)  # which are shown stays as it was
-    corners = vertices(made).reshape(-1, 4, 3)
-    assert np.linalg.norm(corners - POSITIONS[:, None], axis=2)[:, 0] == pytest.approx([0.2, 0, 0.2], abs=1e-6)
-    assert corners.mean(axis=1) == pytest.approx(POSITIONS, abs=1e-6)
-
-
 def test_a_second_one_replaces_the_first() -> None:
     first = cloud()
     before = scenes.blocks()
@@ -109,29 +97,3 @@ def test_slice_holds_the_colors_as_they_are_encoded() -> None:
     plane.data.pixels.foreach_get(pixels)
     assert pixels.reshape(4, 4)[:, :3] == pytest.approx(wanted, abs=0.5 / 255)
     assert plane.empty_display_type == "IMAGE" and tuple(plane.data.size) == (2, 2)
-
-
-def test_views_get_their_shading_back() -> None:
-    views = [s for screen in bpy.data.screens for a in screen.areas for s in a.spaces if s.type == "VIEW_3D"]
-    assert views
-    views[0].shading.color_type = "TEXTURE"
-    solid = [view.shading for view in views if view.shading.type == "SOLID"]
-    before = [(shading.color_type, shading.studio_light) for shading in solid]
-    viewport.show_colors()
-    viewport.show_colors()  # must not take ours for the user's
-    assert {view.shading.color_type for view in views} == {"VERTEX"}
-    assert viewport.colors_changed()
-    solid[0].type = "MATERIAL"  # the light of Solid is out of reach there
-    viewport.restore_colors()
-    assert solid[0].type == "MATERIAL"
-    solid[0].type = "SOLID"
-    assert [(shading.color_type, shading.studio_light) for shading in solid] == before
-    assert not viewport.colors_changed()
-
-
-def test_what_the_user_chose_meanwhile_stays() -> None:
-    view = next(s for screen in bpy.data.screens for a in screen.areas for s in a.spaces if s.type == "VIEW_3D")
-    viewport.show_colors()
-    view.shading.color_type = "RANDOM"
-    viewport.restore_colors()
-    assert view.shading.color_type == "RANDOM"

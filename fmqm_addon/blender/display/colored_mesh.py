@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Colored triangles that are drawn over the 3D view and are no data of the file: nothing can select, render,
+export or save them.
+
+`gpu` works only where there is a window: what needs it is made at the first drawing.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import gpu
+import numpy as np
+from mathutils import Matrix, Vector
+from numpy.typing import NDArray
+
+from ...metric.colorspace import decode_srgb
+
+Array = NDArray[Any]
+
+_WIDTH = 1024  # of the texture that holds the colors
+# How much nearer to the viewer it is drawn than the surface that it lies on, in distances: the same one, or one that
+# is shown with other levels of detail than renders have.
+SAME, SIMILAR = 4e-4, 4e-3
+_DEPTH_STEPS = 1e-6
+
+_VERTEX = """
+void main() {
+  number = entry;
+  place = pos;
+  gl_Position = matrix * vec4(pos, 1.0);
+}
+"""
+# Facets that face sideways are a little darker, or the shape could not be seen.
+_FRAGMENT = """
+void main() {
+  int row = int(number + 0.5);
+  vec4 found = texelFetch(table, ivec2(row % WIDTH, row / WIDTH), 0);
+  if (found.a < 0.5) discard;
+  vec3 normal = cross(dFdx(place), dFdy(place));
+  float facing = abs(dot(normal, towards)) / max(length(normal) * length(towards), 1e-20);
+  color = vec4(found.rgb * mix(0.55, 1.0, facing), 1.0);
+}
+""".replace("WIDTH", str(_WIDTH))
+
+
+class ColoredMesh:
+    """Triangles with a color each, out of a table that can be exchanged."""
+
+    def __init__(self, vertices: Array, triangles: Array, entry: Array) -> None:
+        """Triangles to be drawn.
+
+        Args:
+            vertices: (V, 3). triangles: (T, 3). entry: (V,) the row of the table of each vertex; the last vertex of a
+                triangle counts.
+        """
+        self.vertices, self._triangles, self._entry = vertices, triangles, entry
+        self._batch: Any = None
+        self._table: Any = None
+        self.colors = np.zeros((0, 4), np.float32)
+
+    def set_colors(self, colors: Array, shown: Any = True) -> None:
+        """Gives each row of the table another color.
+
+        Args:
+            colors: (E, 3) encoded (sRGB) in [0, 1]. shown: (E,) which are drawn, or all.
+        """
+        self.colors = np.ones((len(colors), 4), np.float32)
+        self.colors[:, :3] = colors
+        self.colors[:, 3] = shown
+        self._table = None
+
+    def draw(self, matrix: Matrix, region_3d: Any, nearer: float = SAME) -> None:
+        """Draws it in a 3D view, from a POST_VIEW handler.
+
+        Args:
+            matrix: from the vertices to the world. region_3d: of the view. nearer: to the viewer, in distances.
+        """
+        if not len(self.colors):
+            return
+        shader = _shader()
+        if self._batch is None:
+            self._batch = _batch(self.vertices, self._triangles, self._entry)
+        if self._table is None:
+            self._table = _texture(self.colors)
+        depth, mask = gpu.state.depth_test_get(), gpu.state.depth_mask_get()
+        gpu.state.depth_test_set("LESS_EQUAL")
+        gpu.state.depth_mask_set(True)
+        try:
+            shader.bind()
+            shader.uniform_float("matrix", _clip_matrix(region_3d, nearer) @ region_3d.view_matrix @ matrix)
+            shader.uniform_float("towards", _towards(region_3d, matrix))
+            shader.uniform_sampler("table", self._table)
+            self._batch.draw(shader)
+        finally:
+            gpu.state.depth_mask_set(mask)
+            gpu.state.depth_test_set(depth)
+
+
+def from_faces(vertices: Array, triangles: Array, entry: Array) -> ColoredMesh:
+    """A surface with a row of the table for each of its (T,) triangles."""
+    corners = vertices[triangles].reshape(-1, 3)
+    return ColoredMesh(corners, np.arange(len(corners)).reshape(-1, 3), np.repeat(entry, 3))
+
+
+def _clip_matrix(region_3d: Any, nearer: float) -> Matrix:
+    """From the view to the screen, a little nearer to the viewer."""
+    moved = Matrix.Scale(1 - nearer, 4)
+    if not region_3d.is_perspective:
+        moved = Matrix.Translation((0.0, 0.0, nearer * region_3d.view_distance))
+    clip = region_3d.window_matrix @ moved
+    clip[2] -= _DEPTH_STEPS * clip[3]
+    return clip
+
+
+def _towards(region_3d: Any, matrix: Matrix) -> Vector:
+    """The direction to the viewer in the mesh's own space, for normals: they go by the transpose."""
+    back = region_3d.view_matrix.inverted_safe().col[2].to_3d()
+    return matrix.to_3x3().transposed() @ back
+
+
+@cache
+def _shader() -> Any:
+    info = gpu.types.GPUShaderCreateInfo()
+    info.push_constant("MAT4", "matrix")
+    info.push_constant("VEC3", "towards")
+    info.sampler(0, "FLOAT_2D", "table")
+    info.vertex_in(0, "VEC3", "pos")
+    info.vertex_in(1, "FLOAT", "entry")
+    between = gpu.types.GPUStageInterfaceInfo("fmqm_between")
+    between.flat("FLOAT", "number")
+    between.smooth("VEC3", "place")
+    info.vertex_out(between)
+    info.fragment_out(0, "VEC4", "color")
+    info.vertex_source(_VERTEX)
+    info.fragment_source(_FRAGMENT)
+    return gpu.shader.create_from_info(info)
+
+
+def _batch(vertices: Array, triangles: Array, entry: Array) -> Any:
+    form = gpu.types.GPUVertFormat()
+    form.attr_add(id="pos", comp_type="F32", len=3, fetch_mode="FLOAT")
+    form.attr_add(id="entry", comp_type="F32", len=1, fetch_mode="FLOAT")
+    buffer = gpu.types.GPUVertBuf(form, len(vertices))
+    buffer.attr_fill("pos", np.ascontiguousarray(vertices, np.float32))
+    buffer.attr_fill("entry", np.ascontiguousarray(entry, np.float32))
+    index = gpu.types.GPUIndexBuf(type="TRIS", seq=np.ascontiguousarray(triangles, np.int32))
+    return gpu.types.GPUBatch(type="TRIS", buf=buffer, elem=index)
+
+
+def _texture(colors: Array) -> Any:
+    rows = -(-len(colors) // _WIDTH)
+    pixels = np.zeros((rows * _WIDTH, 4), np.float32)
+    pixels[: len(colors)] = colors
+    pixels[:, :3] = decode_srgb(pixels[:, :3])  # views are drawn into linear buffers
+    buffer = gpu.types.Buffer("FLOAT", pixels.size, pixels.ravel())
+    return gpu.types.GPUTexture((_WIDTH, rows), format="RGBA32F", data=buffer)

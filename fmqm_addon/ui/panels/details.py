@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""All numbers of the chosen row."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import bpy
+
+from ...comparison.alignment import SPACE_LABELS
+from ...comparison.judge import Judge
+from ...report.explain import verdict
+from ...report.records import pair_record
+from ..properties.rows import (
+    EXPLAINED,
+    FMQMRow,
+    active_row,
+    is_whole,
+    pair_of,
+    row_attribution,
+    row_reverse,
+    row_scores,
+    row_stderr,
+    settings_name,
+)
+from .sidebar import Sidebar, wrapped
+
+_SHORT_SPACE = {SPACE_LABELS["location"]: "Origins Aligned"}
+NOT_SEEN = "Normal maps, roughness and lighting are not part of FMQM"
+
+
+class FMQM_PT_details(Sidebar, bpy.types.Panel):  # noqa: N801
+    bl_idname = "FMQM_PT_details"
+    bl_parent_id = "FMQM_PT_main"
+    bl_label = "Details"
+    bl_description = "All numbers of the chosen result, and how far to trust it"
+    bl_options: ClassVar = {"DEFAULT_CLOSED"}
+    bl_order = 4
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        row = active_row(context.scene)
+        return row is not None and row_scores(row) is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        row = active_row(context.scene)
+        if row is None:
+            return
+        column = self.layout.column(align=True)
+        _draw_scores(column, row)
+        for label, text in _facts(row):
+            split = column.split(factor=0.5, align=True)
+            split.label(text=f"    {label}")
+            split.label(text=text, translate=False)
+        attribution = row_attribution(row)
+        if attribution is not None:
+            phrase = attribution["phrase"]
+            wrapped(self.layout, context, phrase[:1].upper() + phrase[1:], icon="INFO")
+        if is_whole(row):
+            wrapped(self.layout, context, verdict(pair_record(pair_of(row))), icon="INFO")
+        note = self.layout.column()
+        note.active = False
+        wrapped(note, context, NOT_SEEN)
+
+
+def _draw_scores(column: bpy.types.UILayout, row: FMQMRow) -> None:
+    scores, stderr, reverse = row_scores(row), row_stderr(row), row_reverse(row)
+    if scores is None:
+        return
+    for name in EXPLAINED:
+        if name == "perceived":
+            column.separator()
+        split = column.split(factor=0.5, align=True)
+        label = split.row()
+        label.alignment = "LEFT"
+        label.operator("fmqm.sort_rows", text=EXPLAINED[name][0], emboss=False).column = name
+        error = f" ± {stderr[name]:.4f}" if stderr else ""
+        split.label(text=f"{scores[name]:.4f}{error}")
+    if reverse is None:
+        return
+    for judge in Judge:
+        split = column.split(factor=0.5, align=True)
+        split.label(text=f"    {EXPLAINED[judge.column][0]} Reversed")
+        split.label(text=f"{judge.score(reverse):.4f}")
+
+
+def _facts(row: FMQMRow) -> list[tuple[str, str]]:
+    attribution = row_attribution(row) or {}
+    losses = (("Geometry Loss", "geometry_loss"), ("Texture Loss", "texture_loss"))
+    reference = f"{row.reference_name} (no modifiers)" if row.bare_reference else row.reference_name
+    return [
+        *((label, f"{attribution[key]:.4f}") for label, key in losses if key in attribution),
+        ("Original", reference),
+        ("Triangles", f"{row.triangles:,} ({row.share:.3g} %)"),
+        ("Space", _SHORT_SPACE.get(row.space, row.space.capitalize())),
+        ("Settings", settings_name(row)),
+        ("Patches", f"{row.patches:,}"),
+        ("Samples", f"{row.samples:,}"),
+        ("Time", f"{row.seconds:.2f} s"),
+    ]
+
+
+CLASSES = (FMQM_PT_details,)
