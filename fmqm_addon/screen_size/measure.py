@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..metric.colorspace import encode_srgb
 from ..metric.errors import SettingsError
 from ..metric.geometry import Floats, Ints
-from ..metric.stepper import Progress, Stepper, Work, as_work
+from ..metric.stepper import Progress, Stepper, Work, as_part
 from ..metric.surface import MeshArrays, Surface, preparing_surface
 from .definition import (
     CONDITIONS,
@@ -271,7 +271,7 @@ def _grown(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 def _prepared(mesh: MeshArrays, reference: Surface | None) -> Work[Surface]:
     frame = None if reference is None else reference.frame
-    return (yield from as_work(preparing_surface(mesh, _NoQuery, frame), "prepare", 0.0, 0.1))
+    return (yield from as_part(preparing_surface(mesh, _NoQuery, frame), 0.0, 0.1, "prepare"))
 
 
 class _NoQuery:
