@@ -164,6 +164,14 @@ def _is_pictures(value: object) -> bool:
     )
 
 
+def _is_screen_size(value: object) -> bool:
+    """Whether it can be shown as what screen_size.records.size_record gives."""
+    return isinstance(value, Mapping) and all(
+        isinstance(size, Mapping) and _is_amount(size.get("pixels")) and size.get("bound") in ("", "at least", "below")
+        for size in (value.get("strict"), value.get("fade"))
+    )
+
+
 def is_attribution(value: object) -> bool:
     """Whether it is what comparison.attribution.Attribution.as_dict gives."""
     return (
@@ -221,4 +229,5 @@ _KINDS: dict[str, Any] = {
     "trust": lambda value: value is None or is_trust(value),
     "impairment": lambda value: value is None or value in {words for _, words in IMPAIRMENTS},
     "parts": lambda value: _is_list(value, is_part),
+    "screen_size": lambda value: value is None or _is_screen_size(value),
 }

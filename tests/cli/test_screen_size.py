@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import csv
 import io
 import json
 from pathlib import Path
@@ -10,8 +11,9 @@ from pathlib import Path
 import pytest
 
 from fmqm_addon.cli import command
+from fmqm_addon.report.record_check import record_fault
 from fmqm_addon.screen_size.definition import SIZES
-from tests.blender.script import noise, write_png, write_torus
+from tests.blender.script import SMALL, noise, read_json, score, write_png, write_torus
 
 
 @pytest.fixture(scope="module")
@@ -80,3 +82,18 @@ def test_wrong_arguments_are_refused(
         run("ref.obj", "ref.obj", *wrong)
     assert end.value.code == 2 and why in capsys.readouterr().err
     assert (assets / "ref.obj").read_text(encoding="utf-8").startswith(("mtllib", "#", "v"))
+
+
+def test_score_tells_the_same_sizes(assets: Path, tmp_path: Path) -> None:
+    """In all its outputs, and only where they are asked for."""
+    names = [assets / "ref.obj", assets / "near.obj", assets / "cut.glb"]
+    done = score(*SMALL, *names, "--screen-size", "--json", tmp_path / "s.json", "--csv", tmp_path / "s.csv", "--quiet")
+    assert done.returncode == 1 and "screen_size_strict  screen_size_fade" in done.stdout
+    pairs = read_json(tmp_path / "s.json")["pairs"]
+    _, text = run(*names, "--quiet", "--json", "-")
+    alone = json.loads(text)["levels"][0]["screen_size"]
+    assert pairs[0]["screen_size"] == alone and "screen_size" not in pairs[1]
+    rows = list(csv.DictReader((tmp_path / "s.csv").read_text(encoding="utf-8").splitlines()))
+    assert [row["screen_size_strict"] for row in rows] == [repr(alone["strict"]["pixels"]), ""]
+    assert not record_fault(pairs[0])
+    assert record_fault(pairs[0] | {"screen_size": {"strict": alone["strict"], "fade": {"pixels": "8"}}})
