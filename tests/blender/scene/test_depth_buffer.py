@@ -9,11 +9,13 @@ import bpy
 import numpy as np
 import pytest
 
+from fmqm_addon import api
 from fmqm_addon.blender.files.load import load_asset
 from fmqm_addon.blender.materials.types import Reading
 from fmqm_addon.blender.scene.bvh import BVHQuery
 from fmqm_addon.blender.scene.mesh_arrays import mesh_arrays
 from fmqm_addon.comparison.candidates import moved
+from fmqm_addon.metric.errors import SettingsError
 from fmqm_addon.metric.geometry import closest_on_triangles
 from fmqm_addon.metric.surface import prepare_surface
 from fmqm_addon.screen_size.mipmaps import Mipmaps
@@ -91,3 +93,20 @@ def test_normals_turn_with_their_mesh_and_flat_parts_have_none() -> None:
 
 def unit(normals: np.ndarray) -> np.ndarray:
     return normals / np.linalg.norm(normals, axis=2, keepdims=True)
+
+
+def test_objects_of_the_scene_have_sizes_too() -> None:
+    """By the Python API: a copy, one that is decimated, one without faces."""
+    original, copy, coarse, empty = (scenes.monkey(name) for name in ("original", "copy", "coarse", "empty"))
+    coarse.modifiers.new("Decimate", "DECIMATE").ratio = 0.1
+    empty.data.clear_geometry()
+    before = scenes.blocks()
+    found = api.screen_sizes(original, [copy, coarse, empty])
+    assert scenes.blocks() == before
+    same, worse, none = found.lods
+    assert same.size is not None and same.size.strict.bound == "at least"
+    assert worse.size is not None and worse.size.strict.pixels < 128 and worse.triangles < same.triangles
+    assert none.size is None and "no faces" in str(none.error)
+    assert found.extent.diagonal > found.extent.side > found.extent.radius
+    with pytest.raises(SettingsError):
+        api.screen_sizes(original, copy, views=5)
