@@ -220,11 +220,12 @@ def _any_size(records: Iterable[Mapping[str, Any]]) -> bool:
 def _cells(record: Mapping[str, Any], both: bool, sized: bool) -> tuple[str, ...]:
     reverse = record["reverse"]
     turned = [f"{reverse['FMQM']:.4f}" if reverse else "-"] if both else []
-    sizes = [_size_text(record.get("screen_size"), kind) for kind in SIZES.values()] if sized else []
+    sizes = [size_text(record.get("screen_size"), kind) for kind in SIZES.values()] if sized else []
     return (one_line(record["id"]), *(score_text(record, name, "-", " ±") for name in TABLE), *sizes, *turned)
 
 
-def _size_text(found: Mapping[str, Any] | None, kind: str) -> str:
+def size_text(found: Mapping[str, Any] | None, kind: str) -> str:
+    """A size on screen of a record, as people read it: strict or fade."""
     return "-" if found is None else f"{found[kind]['bound']} {found[kind]['pixels']:.0f}".strip()
 
 
