@@ -165,7 +165,7 @@ def _is_pictures(value: object) -> bool:
     )
 
 
-def _is_screen_size(value: object) -> bool:
+def is_screen_size(value: object) -> bool:
     """Whether it can be shown as what screen_size.records.size_record gives."""
     return (
         isinstance(value, Mapping)
@@ -244,5 +244,5 @@ _KINDS: dict[str, Any] = {
     "trust": lambda value: value is None or is_trust(value),
     "impairment": lambda value: value is None or value in {words for _, words in IMPAIRMENTS},
     "parts": lambda value: _is_list(value, is_part),
-    "screen_size": lambda value: value is None or _is_screen_size(value),
+    "screen_size": lambda value: value is None or is_screen_size(value),
 }

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The sidebar's buttons."""
 
-from . import decimate, inputs, measure, pick, presets, results, save, view
+from . import decimate, inputs, measure, pick, presets, results, save, screen_sizes, view
 
 CLASSES: tuple[type, ...] = (
     *inputs.CLASSES,
@@ -12,4 +12,5 @@ CLASSES: tuple[type, ...] = (
     *view.CLASSES,
     *pick.CLASSES,
     *decimate.CLASSES,
+    *screen_sizes.CLASSES,
 )

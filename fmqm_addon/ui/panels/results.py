@@ -8,7 +8,7 @@ import bpy
 from ...comparison.alignment import SPACE_LABELS
 from ...comparison.judge import Judge
 from ...report.explain import verdict
-from ...report.records import pair_record
+from ...report.records import pair_record, size_text
 from .. import session
 from ..properties.rows import (
     EXPLAINED,
@@ -20,6 +20,7 @@ from ..properties.rows import (
     row_attribution,
     row_reverse,
     row_scores,
+    row_screen_size,
     row_stderr,
     settings_name,
 )
@@ -98,6 +99,9 @@ class FMQM_PT_results(Sidebar, bpy.types.Panel):  # noqa: N801
         chosen = active_row(context.scene)
         if chosen is not None:
             _draw_row(layout, context, fmqm, chosen)
+        row = layout.row()
+        row.operator_context = "INVOKE_DEFAULT"
+        row.operator("fmqm.screen_sizes")
         row = layout.row(align=True)
         row.operator_context = "INVOKE_DEFAULT"
         row.label(text="Save")
@@ -141,6 +145,11 @@ def _draw_row(layout: bpy.types.UILayout, context: bpy.types.Context, fmqm: FMQM
             split = column.split(factor=0.5, align=True)
             split.label(text=f"    {label}")
             split.label(text=f"{attribution[key]:.4f}")
+    sizes = row_screen_size(row)
+    for label, kind in (("Up to (Hard Switch)", "strict"), ("Up to (Faded)", "fade")) if sizes else ():
+        split = column.split(factor=0.5, align=True)
+        split.label(text=f"    {label}")
+        split.label(text=f"{size_text(sizes, kind)} px")
     reference = f"{row.reference_name} (no modifiers)" if row.bare_reference else row.reference_name
     for label, text in (
         ("Against", reference),
