@@ -15,6 +15,7 @@ from typing import TypeAlias
 import bpy
 
 from .blender.materials.types import Reading
+from .blender.scene.bvh import BVHQuery
 from .blender.scene.measure import Outcome, measuring
 from .blender.scene.target import take, target_of
 from .comparison.candidates import AssetMesh
@@ -123,7 +124,7 @@ def screen_sizes(
             read.append((asset.name, take(target_of(asset), reading)))
         except FMQMError as error:
             read.append((asset.name, str(error)))
-    return sizing_chain(original, read, views, space, match_scale).run()
+    return sizing_chain(original, read, BVHQuery, views, space, match_scale).run()
 
 
 def _checked(reference: Asset, others: Asset | Iterable[Asset]) -> list[Asset]:

@@ -102,19 +102,25 @@ def main(argv: Sequence[str], out: TextIO, program: str = PROGRAM) -> int:
 def _measure(args: argparse.Namespace, screen: Screen, reading: Reading, log: Log, out: TextIO) -> int:
     """Measures, prints, writes; Blender is imported only once the arguments are known to be good."""
     prepare_bpy()
+    from ..blender.scene.bvh import BVHQuery
+
     reference = _load(args.reference, reading)
-    sizes = ScreenSizes(reference.world(), args.views)
+    sizes = ScreenSizes(reference.world(), args.views, BVHQuery)
     _run(sizes.prepare(), log, 0, args.reference)
+    for warning in reference.mesh.warnings:
+        log.say(warning, kind="warning: ")
     found: list[ScreenSize | None] = []
     levels: list[dict[str, Any]] = []
     for index, path in enumerate(args.lods):
         triangles, size, error, seconds = None, None, None, 0.0
         notes: tuple[str, ...] = ()
+        warnings: tuple[str, ...] = ()
         try:
             asset = _load(path, reading)
             triangles = len(asset.mesh.triangles)
-            alignment = align(reference, asset, args.space or PairOptions.space, args.match_scale)
-            notes = (*asset.mesh.warnings, *alignment.notes, *alignment.warnings)
+            alignment = align(reference, asset, args.space or PairOptions.space, args.match_scale, sizes.reference)
+            notes = (*asset.mesh.notes, *alignment.notes)
+            warnings = (*asset.mesh.warnings, *alignment.warnings)
             stepper = sizes.measure(alignment.mesh)
             size = _run(stepper, log, index, path)
             seconds = sum(stepper.seconds.values())
@@ -122,12 +128,20 @@ def _measure(args: argparse.Namespace, screen: Screen, reading: Reading, log: Lo
             error = f"{reason}{REMEDIES.get(type(reason), '')}"
             log.say(error if path in error else f"{path}: {error}")
         for note in notes:
-            log.say(note, kind="warning: ")
+            log.say(note, kind="note: ")
+        for warning in warnings:
+            log.say(warning, kind="warning: ")
         found.append(size)
         record = None if size is None else size_record(size)
         levels.append(
-            {"file": path, "triangles": triangles, "screen_size": record, "seconds": seconds, "warnings": list(notes)}
-            | {"error": error}
+            {
+                "file": path,
+                "triangles": triangles,
+                "screen_size": record,
+                "seconds": seconds,
+                "warnings": list(warnings),
+            }
+            | {"notes": list(notes), "error": error}
         )
     log.end()
     switches = [None if size is None else getattr(size, args.transition) for size in found]
@@ -135,6 +149,7 @@ def _measure(args: argparse.Namespace, screen: Screen, reading: Reading, log: Lo
     document: dict[str, Any] = {
         "reference": args.reference,
         "triangles": len(reference.mesh.triangles),
+        "warnings": list(reference.mesh.warnings),
         "blender": blender_version(),
         "definition": definition_record(args.views),
         "levels": levels,

@@ -10,6 +10,7 @@ from ..comparison.alignment import align
 from ..comparison.candidates import AssetMesh
 from ..metric.errors import FMQMError
 from ..metric.stepper import Stepper, Work, as_part
+from ..metric.surface import QueryBuilder
 from .definition import VIEWS
 from .engines import Extent
 from .measure import ScreenSize, ScreenSizes
@@ -43,6 +44,7 @@ class SizedChain:
 def sizing_chain(
     reference: AssetMesh,
     lods: Sequence[tuple[str, AssetMesh | str]],
+    build_query: QueryBuilder,
     views: int = VIEWS,
     space: str = "auto",
     match_scale: bool = False,
@@ -51,13 +53,14 @@ def sizing_chain(
 
     Args:
         reference, lods: read with their normals. Each LOD has a name, and instead of a mesh the reason why it has none.
+        build_query: makes the spatial query of the reference, by which LODs are aligned.
         space, match_scale: as in comparison.alignment.align.
 
     Raises:
         SettingsError: no such number of views.
         MeshError, while stepping: the reference cannot be rendered.
     """
-    return Stepper(_work(ScreenSizes(reference.world(), views), reference, lods, space, match_scale))
+    return Stepper(_work(ScreenSizes(reference.world(), views, build_query), reference, lods, space, match_scale))
 
 
 def _work(
@@ -76,7 +79,7 @@ def _work(
             continue
         triangles = len(asset.mesh.triangles)
         try:
-            placed = align(reference, asset, space, match_scale)
+            placed = align(reference, asset, space, match_scale, sizes.reference)
             size = yield from as_part(sizes.measure(placed.mesh), share * index, share, f"Rendering {name}")
             found.append(SizedLOD(name, triangles, size, (*asset.mesh.warnings, *placed.warnings)))
         except FMQMError as reason:

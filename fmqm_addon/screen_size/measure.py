@@ -13,7 +13,7 @@ from ..metric.colorspace import encode_srgb
 from ..metric.errors import SettingsError
 from ..metric.geometry import Floats, Ints
 from ..metric.stepper import Progress, Stepper, Work, as_part
-from ..metric.surface import MeshArrays, Surface, preparing_surface
+from ..metric.surface import Frame, MeshArrays, QueryBuilder, Surface, preparing_surface
 from .definition import (
     CONDITIONS,
     FADE,
@@ -102,15 +102,17 @@ class ScreenSizes:
 
     Args:
         views: how many, of definition.VIEW_CHOICES.
+        build_query: makes the spatial query of the reference, for who aligns LODs with it; rendering needs none.
 
     Raises:
         SettingsError: views is another number.
     """
 
-    def __init__(self, reference: MeshArrays, views: int = VIEWS) -> None:
+    def __init__(self, reference: MeshArrays, views: int = VIEWS, build_query: QueryBuilder | None = None) -> None:
         if views not in VIEW_CHOICES:
             raise SettingsError(f"views is {views}; it must be {' or '.join(map(str, VIEW_CHOICES))}")
         self._mesh = reference
+        self._build_query = build_query or _NoQuery
         self._axes = [camera_axes(direction) for direction in fibonacci_directions(views)]
         self._reference: _Model
         self._seen: dict[tuple[int, int, _Window], tuple[_Seen, ...]] = {}  # of the reference, by view and size
@@ -134,11 +136,11 @@ class ScreenSizes:
 
     def _prepare(self) -> Work[None]:
         yield Progress("prepare", 0.0)
-        self._reference = _Model((yield from _prepared(self._mesh, None)))
+        self._reference = _Model((yield from _prepared(self._mesh, self._build_query)))
 
     def _measure(self, mesh: MeshArrays) -> Work[ScreenSize]:
         yield Progress("prepare", 0.0)
-        model = _Model((yield from _prepared(mesh, self._reference.surface)))
+        model = _Model((yield from _prepared(mesh, _NoQuery, self._reference.surface.frame)))
         curve: list[AtSize] = []
         for resolution, sizes in ((FIRST_RENDER, _FROM_FIRST), (RENDER, SIZES[len(_FROM_FIRST) :])):
             for index, axes in enumerate(self._axes):
@@ -269,9 +271,8 @@ def _grown(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return grown
 
 
-def _prepared(mesh: MeshArrays, reference: Surface | None) -> Work[Surface]:
-    frame = None if reference is None else reference.frame
-    return (yield from as_part(preparing_surface(mesh, _NoQuery, frame), 0.0, 0.1, "prepare"))
+def _prepared(mesh: MeshArrays, build_query: QueryBuilder, frame: Frame | None = None) -> Work[Surface]:
+    return (yield from as_part(preparing_surface(mesh, build_query, frame), 0.0, 0.1, "prepare"))
 
 
 class _NoQuery:

@@ -97,3 +97,19 @@ def test_score_tells_the_same_sizes(assets: Path, tmp_path: Path) -> None:
     assert [row["screen_size_strict"] for row in rows] == [repr(alone["strict"]["pixels"]), ""]
     assert not record_fault(pairs[0])
     assert record_fault(pairs[0] | {"screen_size": {"strict": alone["strict"], "fade": {"pixels": "8"}}})
+
+
+def test_an_lod_is_put_where_it_is_scored(assets: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Another axis is up, and it stands beside the reference: it is put there, and a note says so."""
+    turned = assets / "turned.obj"
+    lines = (assets / "ref.obj").read_text(encoding="utf-8").splitlines()
+    for index, line in enumerate(lines):
+        if line.startswith("v "):
+            x, y, z = map(float, line.split()[1:4])
+            lines[index] = f"v {x + 5} {-z} {y}"
+    turned.write_text("\n".join(lines), encoding="utf-8")
+    code, text = run(assets / "ref.obj", turned, "--quiet", "--json", "-")
+    (level,) = json.loads(text)["levels"]
+    assert code == 0 and level["screen_size"]["strict"]["bound"] == "at least"
+    assert level["warnings"] == [] and "turned by" in level["notes"][0]
+    assert f"note: {level['notes'][0]}" in capsys.readouterr().err

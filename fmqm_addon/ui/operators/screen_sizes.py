@@ -10,6 +10,7 @@ from typing import ClassVar
 import bpy
 
 from ...blender.materials.types import Reading
+from ...blender.scene.bvh import BVHQuery
 from ...blender.scene.target import Target, take
 from ...comparison.candidates import AssetMesh
 from ...metric.errors import FMQMError
@@ -102,7 +103,7 @@ def _sizing(
     if isinstance(original, str):
         return original
     try:
-        sizing = sizing_chain(original, read[1:], space=space, match_scale=match_scale)
+        sizing = sizing_chain(original, read[1:], BVHQuery, space=space, match_scale=match_scale)
         return (yield from as_part(sizing, _READING, 1 - _READING)).lods
     except FMQMError as error:
         return str(error)
