@@ -15,14 +15,19 @@ from typing import TypeAlias
 import bpy
 
 from .blender.materials.types import Reading
+from .blender.scene.bvh import BVHQuery
 from .blender.scene.measure import Outcome, measuring
-from .blender.scene.target import target_of
+from .blender.scene.target import take, target_of
+from .comparison.candidates import AssetMesh
 from .comparison.pair import PairOptions
+from .metric.errors import FMQMError
 from .metric.evaluation import COLUMNS, Result, Scores
 from .metric.perceived import Perceived
 from .metric.settings import PRESETS, Settings
+from .screen_size.chain import SizedChain, sizing_chain
+from .screen_size.definition import VIEWS
 
-__all__ = ["COLUMNS", "PRESETS", "Outcome", "Perceived", "Result", "Scores", "Settings", "measure"]
+__all__ = ["COLUMNS", "PRESETS", "Outcome", "Perceived", "Result", "Scores", "Settings", "measure", "screen_sizes"]
 
 Asset: TypeAlias = bpy.types.Object | bpy.types.Collection
 _ASSETS = (bpy.types.Object, bpy.types.Collection)
@@ -71,10 +76,7 @@ def measure(
         TypeError: an asset is no object and no collection.
         SettingsError: a setting has a value that it cannot have.
     """
-    assets = list(distorted) if isinstance(distorted, Iterable) else [distorted]
-    for asset in (reference, *assets):
-        if not isinstance(asset, _ASSETS) or asset.is_embedded_data:
-            raise TypeError(f"{asset!r} is given; an object or a collection, not the scene's own, is wanted")
+    assets = _checked(reference, distorted)
     options = PairOptions(
         settings=settings or Settings(),
         repeats=repeats,
@@ -88,3 +90,46 @@ def measure(
     reference_target = target_of(reference, bare=reference_without_modifiers)
     targets = [target_of(asset) for asset in assets]
     return measuring(reference_target, targets, options, reading).run()
+
+
+def screen_sizes(
+    reference: Asset,
+    lods: Asset | Iterable[Asset],
+    views: int = VIEWS,
+    space: str = "auto",
+    match_scale: bool = False,
+    bake: int = Reading.bake,
+) -> SizedChain:
+    """At which size on screen LODs may be shown in place of their reference (docs/screen-size.md).
+
+    Args:
+        reference, lods, space, match_scale, bake: as for measure. views: 6, or 12.
+
+    Returns:
+        `chain.lods` has an item per LOD, in their order: `lod.size.strict.pixels` for a hard switch,
+        `lod.size.fade.pixels` for a dithered one, or `lod.error`. screen_size.engines makes of them what engines take.
+
+    Raises:
+        TypeError: an asset is no object and no collection.
+        SettingsError: a setting has a value that it cannot have.
+        MeshError: the reference cannot be measured.
+    """
+    assets = _checked(reference, lods)
+    reading = Reading(bake=bake, normals=True)
+    PairOptions(space=space)  # it raises what is wrong
+    original = take(target_of(reference), reading)
+    read: list[tuple[str, AssetMesh | str]] = []
+    for asset in assets:
+        try:
+            read.append((asset.name, take(target_of(asset), reading)))
+        except FMQMError as error:
+            read.append((asset.name, str(error)))
+    return sizing_chain(original, read, BVHQuery, views, space, match_scale).run()
+
+
+def _checked(reference: Asset, others: Asset | Iterable[Asset]) -> list[Asset]:
+    assets = list(others) if isinstance(others, Iterable) else [others]
+    for asset in (reference, *assets):
+        if not isinstance(asset, _ASSETS) or asset.is_embedded_data:
+            raise TypeError(f"{asset!r} is given; an object or a collection, not the scene's own, is wanted")
+    return assets

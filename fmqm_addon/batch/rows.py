@@ -25,13 +25,14 @@ class BatchOptions:
     Attributes:
         pair: of every pair, before a row's own settings.
         reading: of all assets, textures of their own aside.
-        explain: in words, too.
+        explain: in words, too. screen_size: at which size on screen the distorted may be shown, too.
         report: folder of the report, for pictures; "" makes none. judge: which reading they show. They change no score.
     """
 
     pair: PairOptions = PairOptions()
     reading: Reading = Reading()
     explain: bool = False
+    screen_size: bool = False
     report: str = ""
     judge: Judge = Judge.FMQM
 
@@ -43,6 +44,7 @@ class BatchOptions:
         """Plain values under the names of the command line's flags; which files may be named changes no score."""
         pair, reading = self.pair, self.reading
         extra: dict[str, Any] = {"attribution": pair.attribution, "explain": self.explain, "both": pair.both}
+        extra["screen_size"] = self.screen_size
         extra["bake"] = reading.bake if reading.stand_in or reading.bake != Reading.bake else None
         for name, value, default in (
             ("max_image_side", reading.limits.side, DEFAULT_LIMITS.side),

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from ..comparison.measurement import Measurement
     from ..comparison.pair import PairOptions, PairResult
     from ..metric.stepper import Stepper
+    from ..screen_size.measure import ScreenSizes
 
 T = TypeVar("T")
 # What the scripts can do about an error; the sidebar cannot.
@@ -102,6 +103,7 @@ class _Scorer:
         self._journal = journal
         self._log = log
         self._before_each = before_each
+        self._sizes: ScreenSizes | None = None  # of the group's reference
         self._units = 0  # of work done
         self._seconds: dict[str, float] = {}  # of the pair at hand, by stage
 
@@ -118,6 +120,7 @@ class _Scorer:
         try:
             reference = self._load(row, row.reference, row.ref_texture)
             self._note_memory(reference, options)
+            self._sizes = self._screen_sizes(reference)
             measurement = measurement_of(reference, surface_query, options)
             self._work(measurement.prepare(), "preparing the reference")
         except Exception as error:
@@ -195,7 +198,21 @@ class _Scorer:
             findings["where"] = where(answer.reference, result)
         if answer.attribution is not None:
             findings["attribution"] = answer.attribution.as_dict()
+        if self._sizes is not None:
+            from ..screen_size.records import size_record
+
+            sized = self._work(self._sizes.measure(answer.alignment.mesh), f"rendering {row.id}")
+            findings["screen_size"] = size_record(sized)
         return findings
+
+    def _screen_sizes(self, reference: AssetMesh) -> ScreenSizes | None:
+        if not self._options.screen_size:
+            return None
+        from ..screen_size.measure import ScreenSizes
+
+        sizes = ScreenSizes(reference.world())
+        self._work(sizes.prepare(), "preparing the reference")
+        return sizes
 
     def _load(self, row: Row, name: str, image: str) -> AssetMesh:
         self._log.show(self._units, f"loading {name}")

@@ -125,6 +125,10 @@ def build_parser(program: str) -> OneLineParser:
     output.add_argument("--save-fields", metavar="FILE.npz", help="samples, fields and patch scores of the one pair")
     output.add_argument("--picture", metavar="FILE.png", help="reference, distorted and heat map of the one pair")
     output.add_argument("--explain", action="store_true", help="a paragraph a pair: what got worse, where, how surely")
+    output.add_argument(
+        "--screen-size", action="store_true",
+        help="at which size on screen, in pixels of the box's diagonal, each may be shown in place of its reference",
+    )  # fmt: skip
     add_judge(output, "about --fail-under, a manifest's fail_under, heat maps and worst places")
     output.add_argument(
         "--fail-under", type=_thresholds, metavar="X", help="exit code 1 if a score is below X; for --lods also "
@@ -156,13 +160,15 @@ def options_of(args: argparse.Namespace) -> BatchOptions:
         stand_in=bool(args.bake),
         limits=ImageLimits(args.max_image_side or DEFAULT_LIMITS.side, args.max_image_bytes or DEFAULT_LIMITS.decoded),
         access=Access(args.untrusted, args.asset_root or ""),
+        normals=args.screen_size,
         include=tuple(args.include),
         exclude=tuple(args.exclude),
         frame=args.frame,
     )
     pair = PairOptions(settings=settings_of(args), **given)
     judge = args.judge or Judge.FMQM
-    return BatchOptions(pair=pair, reading=reading, explain=args.explain, report=args.report or "", judge=judge)
+    extra = {"explain": args.explain, "screen_size": args.screen_size, "report": args.report or ""}
+    return BatchOptions(pair=pair, reading=reading, judge=judge, **extra)
 
 
 def _thresholds(text: str) -> tuple[float, ...]:
@@ -210,7 +216,7 @@ def check_arguments(args: argparse.Namespace) -> None:
         raise SettingsError("--resume needs --journal, or an output file beside which the journal is")
     if args.shard:
         shard_of(args.shard)
-    scoring = ("jobs", "dask", "resume", "shard", "save_fields", "picture", "both", "attribution")
+    scoring = ("jobs", "dask", "resume", "shard", "save_fields", "picture", "both", "attribution", "screen_size")
     ignored = [flag for flag in scoring if args.merge and getattr(args, flag)]
     if ignored:
         raise SettingsError(f"--merge scores nothing; leave out {flag_of(ignored)}")

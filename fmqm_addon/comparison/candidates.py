@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..metric.geometry import Floats
 from ..metric.surface import MeshArrays
@@ -56,7 +58,16 @@ class Candidate:
 def moved(mesh: MeshArrays, matrix: Floats) -> MeshArrays:
     """The mesh with a (4, 4) matrix applied."""
     scale = float(np.linalg.norm(matrix[:3, :3], axis=0).max())
-    return replace(mesh, positions=transformed(mesh.positions, matrix), rounding=mesh.rounding * scale)
+    normals = None if mesh.normals is None else _turned(mesh.normals, matrix)
+    positions = transformed(mesh.positions, matrix)
+    return replace(mesh, positions=positions, rounding=mesh.rounding * scale, normals=normals)
+
+
+def _turned(normals: NDArray[Any], matrix: Floats) -> Floats:
+    """(T, 3, 3) normals under a matrix: times its cofactors, which are finite where it has no inverse."""
+    x, y, z = matrix[:3, :3]
+    with np.errstate(all="ignore"):
+        return np.asarray(normals @ np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)]).T, np.float64)
 
 
 def unit_factor(box: Floats, target: Floats) -> float:

@@ -37,6 +37,8 @@ class MeshArrays:
         objects: names of what it was joined from; none: it is one object, of the name of the mesh.
         object: (T,) integers into objects.
         rounding: the positions were rounded to about this much where they were stored, in scene units.
+        normals: (T, 3, 3) float at the corners, for who renders the mesh; zero at those that have none of their own.
+            None: none were read. The metric does not see them.
     """
 
     name: str
@@ -50,6 +52,7 @@ class MeshArrays:
     objects: tuple[str, ...] = ()
     object: NDArray[Any] | None = None
     rounding: float = 0.0
+    normals: NDArray[Any] | None = None
 
 
 def join_meshes(parts: Sequence[MeshArrays], name: str) -> MeshArrays:
@@ -82,6 +85,15 @@ def join_meshes(parts: Sequence[MeshArrays], name: str) -> MeshArrays:
         objects=objects,
         object=np.repeat(np.arange(len(parts), dtype=np.int32), [len(part.triangles) for part in parts]),
         rounding=max(part.rounding for part in parts),
+        normals=_joined_normals(parts),
+    )
+
+
+def _joined_normals(parts: Sequence[MeshArrays]) -> NDArray[Any] | None:
+    if all(part.normals is None for part in parts):
+        return None
+    return np.concatenate(
+        [np.zeros((len(part.triangles), 3, 3)) if part.normals is None else part.normals for part in parts]
     )
 
 
@@ -144,6 +156,7 @@ class Surface:
         source: (T,) int64, the row of each triangle in MeshArrays.
         objects: names, at least one. object: (T,) into objects. rounding: as in MeshArrays, in the metric's frame.
         preparation: what was left out and welded. warnings, notes: as in MeshArrays, and what preparing adds to them.
+        normals: (T, 3, 3) float64, as in MeshArrays.
     """
 
     name: str
@@ -161,6 +174,7 @@ class Surface:
     preparation: Preparation
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
+    normals: Floats | None = None
 
     def color_at(self, triangle: Ints, barycentric: Floats) -> Floats:
         """Equations (5) to (7): (N, 3) float64 sRGB colors at barycentric (N, 3) places of (N,) triangles."""
@@ -279,6 +293,7 @@ def preparing_surface(
         preparation=Preparation(len(mesh.triangles), not_finite, flat, repeated, welded),
         warnings=tuple(warnings),
         notes=tuple(notes),
+        normals=None if mesh.normals is None else np.asarray(mesh.normals, np.float64)[source],
     )
 
 

@@ -22,6 +22,7 @@ _LARGEST = 2**63  # of a number; larger ones cannot be shown
 _CANNOT_BE_SHOWN = (
     AttributeError, IndexError, KeyError, OverflowError, RecursionError, StopIteration, TypeError, ValueError,
 )  # fmt: skip
+_BOUNDS = ("", "at least", "below")  # of a size on screen
 _ROUNDING = 1e-9  # by which a score may leave [0, 1]
 
 
@@ -164,6 +165,28 @@ def _is_pictures(value: object) -> bool:
     )
 
 
+def is_screen_size(value: object) -> bool:
+    """Whether it can be shown as what screen_size.records.size_record gives."""
+    return (
+        isinstance(value, Mapping)
+        and all(
+            isinstance(size, Mapping) and _is_amount(size.get("pixels")) and size.get("bound") in _BOUNDS
+            for size in (value.get("strict"), value.get("fade"))
+        )
+        and _is_list(value.get("curve"), _is_at_size)
+        and len(value["curve"]) > 0
+    )
+
+
+def _is_at_size(value: object) -> bool:
+    return (
+        isinstance(value, Mapping)
+        and _is_amount(value.get("D_strict"))
+        and _is_amount(value.get("size"))
+        and value["size"] > 0
+    )
+
+
 def is_attribution(value: object) -> bool:
     """Whether it is what comparison.attribution.Attribution.as_dict gives."""
     return (
@@ -221,4 +244,5 @@ _KINDS: dict[str, Any] = {
     "trust": lambda value: value is None or is_trust(value),
     "impairment": lambda value: value is None or value in {words for _, words in IMPAIRMENTS},
     "parts": lambda value: _is_list(value, is_part),
+    "screen_size": lambda value: value is None or is_screen_size(value),
 }

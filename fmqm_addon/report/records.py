@@ -25,6 +25,7 @@ TABLE = (*SHOWN, "perceived")
 STAGES = ("load", "prepare", "fields", "features", "total")
 BESIDE = ("triangles", "triangle_share", "texture_bytes", "level", "notes", "warnings")  # columns after the scores
 SEPARATOR = " | "  # of notes and warnings in one cell
+SIZES = {"screen_size_strict": "strict", "screen_size_fade": "fade"}  # columns, where sizes were asked for
 REVERSE = "reverse "  # before the names of the other direction's columns
 _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "\uff1d", "\uff0b", "\uff0d", "\uff20")  # the last are wide ones
 _QUOTED = re.compile('[,"\r\n]')  # readers end a line at either of the last two
@@ -52,7 +53,7 @@ class PairScore:
         space: where the two were compared, as comparison.alignment.Alignment.label has it.
         reverse: readings of the other direction, the distorted mesh as the reference; None: not asked for.
         trust: as report.trust_table.trust_dict has it. parts: as comparison.parts.Part.as_dict has each.
-        findings: what else was asked for, by its key in the record: where, attribution, pictures.
+        findings: what else was asked for, by its key in the record: where, attribution, pictures, screen_size.
     """
 
     reference: str
@@ -110,32 +111,36 @@ def _json(value: Any) -> str:
 def csv_parts(records: Iterable[Mapping[str, Any]], raw: bool = False) -> Iterator[str]:
     """Numbers at full precision with a decimal point, whatever the locale; fields that failed are empty.
 
-    The other direction's columns are there, at the end, where it was measured. Goes through the records twice.
+    Sizes on screen and the other direction's columns are there, at the end, where they were measured. Goes through the
+    records three times.
 
     Args:
         raw: texts as they are. Else one that a spreadsheet would take for a formula comes after a single quote.
     """
     names, numbers = ("id", "reference", "distorted"), (*SHOWN, *PERCEIVED)
     turned = numbers if _any_reverse(records) else ()
-    yield _csv_line((*names, *numbers, "error", *BESIDE, *(f"{REVERSE}{name}" for name in turned)))
+    sizes = SIZES if _any_size(records) else {}
+    yield _csv_line((*names, *numbers, "error", *BESIDE, *sizes, *(f"{REVERSE}{name}" for name in turned)))
     for record in records:
         values = [record[name] for name in names] + [value_of(record, name) for name in numbers] + [record["error"]]
         values += [_joined(record[name]) for name in BESIDE]
+        found = record.get("screen_size")
+        values += [None if found is None else found[kind]["pixels"] for kind in sizes.values()]
         reverse = record["reverse"] or _UNREAD
         yield _csv_line(values + [value_of(reverse, name) for name in turned], raw)
 
 
 def table_parts(records: Iterable[Mapping[str, Any]]) -> Iterator[str]:
-    """An aligned table, one row a record; goes through the records three times.
+    """An aligned table, one row a record; goes through the records four times.
 
-    The other direction's FMQM is the last column, where it was measured.
+    Sizes on screen and the other direction's FMQM are the last columns, where they were measured.
     """
-    both = _any_reverse(records)
-    header = ("id", *TABLE, *([f"{REVERSE}FMQM"] if both else []))
+    both, sized = _any_reverse(records), _any_size(records)
+    header = ("id", *TABLE, *(SIZES if sized else ()), *([f"{REVERSE}FMQM"] if both else []))
     widths = [len(name) for name in header]
     for record in records:
-        widths = [max(width, len(cell)) for width, cell in zip(widths, _cells(record, both), strict=True)]
-    for cells in chain([header], (_cells(record, both) for record in records)):
+        widths = [max(width, len(cell)) for width, cell in zip(widths, _cells(record, both, sized), strict=True)]
+    for cells in chain([header], (_cells(record, both, sized) for record in records)):
         aligned = (cell.rjust(width) for cell, width in zip(cells[1:], widths[1:], strict=True))
         yield "  ".join((cells[0].ljust(widths[0]), *aligned)).rstrip() + "\n"
 
@@ -208,10 +213,20 @@ def _any_reverse(records: Iterable[Mapping[str, Any]]) -> bool:
     return any(record["reverse"] is not None for record in records)
 
 
-def _cells(record: Mapping[str, Any], both: bool) -> tuple[str, ...]:
+def _any_size(records: Iterable[Mapping[str, Any]]) -> bool:
+    return any(record.get("screen_size") is not None for record in records)
+
+
+def _cells(record: Mapping[str, Any], both: bool, sized: bool) -> tuple[str, ...]:
     reverse = record["reverse"]
     turned = [f"{reverse['FMQM']:.4f}" if reverse else "-"] if both else []
-    return (one_line(record["id"]), *(score_text(record, name, "-", " ±") for name in TABLE), *turned)
+    sizes = [size_text(record.get("screen_size"), kind) for kind in SIZES.values()] if sized else []
+    return (one_line(record["id"]), *(score_text(record, name, "-", " ±") for name in TABLE), *sizes, *turned)
+
+
+def size_text(found: Mapping[str, Any] | None, kind: str) -> str:
+    """A size on screen of a record, as people read it: strict or fade."""
+    return "-" if found is None else f"{found[kind]['bound']} {found[kind]['pixels']:.0f}".strip()
 
 
 def _csv_line(values: Iterable[str | float | None], raw: bool = False) -> str:

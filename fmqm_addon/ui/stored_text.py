@@ -15,7 +15,7 @@ from ..comparison.measurement import Readings
 from ..metric.evaluation import Scores
 from ..metric.perceived import Perceived
 from ..metric.settings import SETTING_NAMES
-from ..report.record_check import checked_json, is_attribution, is_part, is_settings, is_trust
+from ..report.record_check import checked_json, is_attribution, is_part, is_screen_size, is_settings, is_trust
 from ..report.trust_table import Report
 
 T = TypeVar("T")
@@ -60,6 +60,13 @@ def read_attribution(text: str) -> dict[str, Any] | None:
     """As comparison.attribution.Attribution.as_dict has it."""
     found = _read(text)
     return found if isinstance(found, dict) and is_attribution(found) else None
+
+
+@functools.lru_cache(64)
+def read_screen_size(text: str) -> dict[str, Any] | None:
+    """As screen_size.records.size_record has it."""
+    found = _read(text)
+    return found if isinstance(found, dict) and is_screen_size(found) else None
 
 
 @functools.lru_cache(64)

@@ -21,10 +21,11 @@ _MATERIALS = {*_MIDDLE, "blender"}
 _BAKING = {*_MATERIALS, "blender/materials"}
 _SCENE = {*_BAKING, "blender/baking"}
 _FILES = {*_SCENE, "blender/scene"}
-_BELOW = {*_FILES, "blender/files", "blender/display", "report"}
+_BELOW = {*_FILES, "blender/files", "blender/display", "report", "screen_size"}
 MAY_KNOW = {
     "metric": set(),
     "comparison": {"metric"},
+    "screen_size": _MIDDLE,
     "report": _MIDDLE,
     "blender": _MIDDLE,  # what lies beside its rooms and serves them all
     "blender/materials": _MATERIALS,
@@ -148,7 +149,7 @@ assert not {"bpy", "mathutils"} & set(sys.modules), "Blender was imported"
 """
 
 
-@pytest.mark.parametrize("room", ["metric", "comparison", "report", "batch", "cli"])
+@pytest.mark.parametrize("room", ["metric", "comparison", "screen_size", "report", "batch", "cli"])
 def test_rooms_import_without_blender(room: str) -> None:
     modules = [module for module in MODULES if room_of(module) == room]
     assert len(modules) > 1

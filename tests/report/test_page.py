@@ -387,3 +387,16 @@ def test_a_report_that_cannot_be_written_is_said_before_any_work(run: Path) -> N
     done = score(*FILES, "--report", "taken", cwd=run)
     assert done.returncode == 1 and done.stdout == ""
     assert re.fullmatch(r"score\.py: taken: this folder cannot be made \(.*\); name another\n", done.stderr)
+
+
+def test_sizes_on_screen_are_drawn_where_they_were_asked_for() -> None:
+    """The mark stands on D = 1 at the switch, or at the end of a curve that never fails."""
+    curve = [{"size": 16 * 2**k, "D_strict": 0.5 * 2**k} for k in range(3)]
+    sizes = {"strict": {"pixels": 32.0, "bound": ""}, "fade": {"pixels": 512.0, "bound": "at least"}, "curve": curve}
+    page = Page(record(screen_size=sizes))
+    assert "Strict: 32 px. Fade: at least 512 px." in page.text
+    drawing = ElementTree.fromstring(re.search(r"<svg.*?</svg>", page.html, re.DOTALL)[0])  # type: ignore[index]
+    (mark,) = (each for each in drawing.iter() if each.tag.endswith("circle"))
+    line = next(each for each in drawing.iter() if each.tag.endswith("polyline")).attrib["points"].split()
+    assert f"{mark.attrib['cx']},{mark.attrib['cy']}" == line[1]
+    assert "Size on screen" not in Page(record()).text

@@ -27,8 +27,8 @@ NO_SECOND = json.dumps(
     {**dict.fromkeys(("stderr", "perceived", "perceived_stderr")), "scores": [1.0] * 5, "fmqm_p10": 1.0}
 )
 BROKEN = (*BROKEN, NO_SECOND)
-NAMES = ("scores", "reverse", "attribution", "trust", "settings", "stages")
-FINE = {*((name, "") for name in ("reverse", "attribution", "trust", "stages")), ("stages", "{}")}
+NAMES = ("scores", "reverse", "attribution", "screen_size", "trust", "settings", "stages")
+FINE = {*((name, "") for name in ("reverse", "attribution", "screen_size", "trust", "stages")), ("stages", "{}")}
 
 
 @pytest.fixture

@@ -29,6 +29,7 @@ class Reading:
         include, exclude: patterns of names, as of files (`*_hull?`), whatever their case: of the objects that are
             measured, of what they hang from or of their collections. No include takes all.
         frame: at which a file's first clip, or a .blend, is measured; None: as it stands without a clip, or was saved.
+        normals: the normals at the corners are read, too, for who renders the mesh.
 
     Raises:
         SettingsError: bake is not between 0 and MAX_BAKE, or frame not one that Blender has.
@@ -42,6 +43,7 @@ class Reading:
     include: tuple[str, ...] = ()
     exclude: tuple[str, ...] = ()
     frame: int | None = None
+    normals: bool = False
 
     def __post_init__(self) -> None:
         if not 0 <= self.bake <= MAX_BAKE:

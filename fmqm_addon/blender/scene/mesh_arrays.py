@@ -34,6 +34,7 @@ from .mesh_layers import (
     layer_values,
     look_on_mesh,
     missing_warning,
+    own_normals,
     range_warnings,
     rows_by_slot,
     triangulated,
@@ -182,6 +183,7 @@ class _Shape:
         made: a temporary copy of a mesh that no object has as its own and that has something to bake. matrix: (4, 4),
             where it is first shown.
         positions: (V, 3) float32. triangles: (T, 3) int32. slots: by their index.
+        normals: (T, 3, 3) float32; None: none were asked for, or it has none of its own.
     """
 
     source: bpy.types.Object
@@ -192,6 +194,7 @@ class _Shape:
     positions: NDArray[np.float32]
     triangles: NDArray[np.int32]
     slots: dict[int, _Slot]
+    normals: NDArray[np.float32] | None
 
 
 def _key(each: Shown) -> _Key:
@@ -230,6 +233,7 @@ def _read_shape(each: Shown, cache: TextureCache, reading: Reading, temporary: E
             positions=arrays.read_attribute(mesh, "position", "vector", 3, np.float32),
             triangles=cut.vertices,
             slots=slots,
+            normals=own_normals(mesh, cut) if reading.normals else None,
         )
     finally:
         object_.to_mesh_clear()
@@ -304,6 +308,7 @@ def _as_arrays(shape: _Shape, reading: Reading) -> MeshArrays:
         warnings=(*(warning for look in looks for warning in look.warnings), *of_slots),
         notes=tuple(note for look in looks for note in look.notes),
         rounding=_rounding(shape.positions),
+        normals=shape.normals,
     )
 
 

@@ -106,6 +106,14 @@ def layer_values(mesh: bpy.types.Mesh, layer: MeshLayer, cut: Triangles, rows: R
     return linear[(cut.loops if colors.domain == "CORNER" else cut.vertices)[rows]]
 
 
+def own_normals(mesh: bpy.types.Mesh, cut: Triangles) -> NDArray[np.float32] | None:
+    """(T, 3, 3) normals at the triangles' corners as Blender shades them; None where all faces are flat, as most are
+    in files that say nothing of normals."""
+    if mesh.normals_domain == "FACE" and not mesh.has_custom_normals:
+        return None
+    return arrays.read(mesh.corner_normals, "vector", 3, np.float32)[cut.loops]
+
+
 def _layer_of(mesh: bpy.types.Mesh, layer: MeshLayer) -> bpy.types.MeshUVLoopLayer | bpy.types.Attribute | None:
     return _uv_map(mesh, layer.name) if layer.kind == "uv" else _color_attribute(mesh, layer.name)
 

@@ -17,6 +17,7 @@ from ..records import PERCEIVED, SHOWN, value_of
 from ..trust_table import Report, trust_lines
 from ..visual.colormap import NO_PATCH, score_colors
 from .fragments import MEGABYTE, bar, css, score, text
+from .size_curve import size_panel
 
 Record = Mapping[str, Any]
 
@@ -51,6 +52,8 @@ def pair_card(number: int, record: Record, name: str) -> str:
             f"{_attribution(record.get('attribution'))}"
             f"<h4>Perceived and its features</h4>{_numbers(record, PERCEIVED)}</div>{close_ups}</div>"
         )
+    if sizes := size_panel(record.get("screen_size")):
+        parts.append(f'<div class="curves">{sizes}</div>')
     if record["parts"]:
         parts.append(_parts(record["parts"]))
     if record["notes"]:

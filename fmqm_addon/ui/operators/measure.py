@@ -139,6 +139,7 @@ def _write_row(fmqm: FMQMScene, outcome: Outcome, settings_text: str) -> None:
     row.triangles = outcome.triangles
     row.share = 100 * outcome.triangles / outcome.reference_triangles if outcome.reference_triangles else 0.0
     row.attribution = "" if outcome.attribution is None else json.dumps(outcome.attribution.as_dict(), allow_nan=False)
+    row.screen_size = ""
     row.trust = "" if outcome.trust is None else json.dumps(trust_dict(outcome.trust), allow_nan=False)
     parts = [] if outcome.trust is None else [part.as_dict() for part in outcome.trust.parts]
     row.parts = json.dumps(parts, allow_nan=False) if parts else ""

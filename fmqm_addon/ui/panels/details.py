@@ -10,7 +10,7 @@ import bpy
 from ...comparison.alignment import SPACE_LABELS
 from ...comparison.judge import Judge
 from ...report.explain import verdict
-from ...report.records import pair_record
+from ...report.records import pair_record, size_text
 from ..properties.rows import (
     EXPLAINED,
     FMQMRow,
@@ -20,6 +20,7 @@ from ..properties.rows import (
     row_attribution,
     row_reverse,
     row_scores,
+    row_screen_size,
     row_stderr,
     settings_name,
 )
@@ -87,9 +88,12 @@ def _draw_scores(column: bpy.types.UILayout, row: FMQMRow) -> None:
 def _facts(row: FMQMRow) -> list[tuple[str, str]]:
     attribution = row_attribution(row) or {}
     losses = (("Geometry Loss", "geometry_loss"), ("Texture Loss", "texture_loss"))
+    sizes = row_screen_size(row)
+    switches = (("Up to (Hard Switch)", "strict"), ("Up to (Faded)", "fade")) if sizes else ()
     reference = f"{row.reference_name} (no modifiers)" if row.bare_reference else row.reference_name
     return [
         *((label, f"{attribution[key]:.4f}") for label, key in losses if key in attribution),
+        *((label, f"{size_text(sizes, kind)} px") for label, kind in switches),
         ("Original", reference),
         ("Triangles", f"{row.triangles:,} ({row.share:.3g} %)"),
         ("Space", _SHORT_SPACE.get(row.space, row.space.capitalize())),

@@ -146,6 +146,9 @@ class FMQM_PT_results(Sidebar, bpy.types.Panel):  # noqa: N801
         side.menu("FMQM_MT_results", text="", icon="DOWNARROW_HLT")
         if chosen is not None and not all(comparable(chosen, other) for other in fmqm.rows if row_scores(other)):
             wrapped(layout, context, "Scores in grey were measured at other settings: do not compare", icon="INFO")
+        row = layout.row()
+        row.operator_context = "INVOKE_DEFAULT"
+        row.operator("fmqm.screen_sizes")
         row = layout.row(align=True)
         row.operator_context = "INVOKE_DEFAULT"
         row.label(text="Save")

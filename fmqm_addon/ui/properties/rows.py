@@ -81,6 +81,7 @@ class FMQMRow(bpy.types.PropertyGroup):
     settings: StringProperty(name="Settings", description="Settings of the measurement, as JSON")
     reverse: StringProperty(name="Reverse", description="As Scores, of the other direction; empty: not measured")
     attribution: StringProperty(name="Attribution", description="Whose loss it is, as JSON; empty: not measured")
+    screen_size: StringProperty(name="Screen Size", description="Where it may be shown, as JSON; empty: not measured")
     trust: StringProperty(name="Trust", description="How far to trust the scores: facts with their units, as JSON")
     parts: StringProperty(name="Parts", description="Scores of the original's parts, as JSON")
     fingerprint: StringProperty(name="Fingerprint", description="Tells whether what was measured has changed since")
@@ -139,6 +140,11 @@ def row_attribution(row: FMQMRow) -> dict[str, Any] | None:
     return stored_text.read_attribution(row.attribution)
 
 
+def row_screen_size(row: FMQMRow) -> dict[str, Any] | None:
+    """At which size on screen it may be shown, as screen_size.records.size_record has it; None: not measured."""
+    return stored_text.read_screen_size(row.screen_size)
+
+
 def row_trust(row: FMQMRow) -> Report | None:
     """The trust report of a row; None for a row with an error."""
     return stored_text.read_trust(row.trust)
@@ -184,6 +190,7 @@ def is_whole(row: FMQMRow) -> bool:
         (row.reverse, stored_text.read_readings),
         (row.former, stored_text.read_readings),
         (row.attribution, stored_text.read_attribution),
+        (row.screen_size, stored_text.read_screen_size),
         (row.trust, stored_text.read_trust),
         (row.parts, stored_text.read_parts),
         (row.settings, stored_text.read_settings),
@@ -196,7 +203,7 @@ def is_whole(row: FMQMRow) -> bool:
 def pair_of(row: FMQMRow) -> PairScore:
     """A row as the reports want it."""
     reference, target = row_targets(row)
-    attribution = row_attribution(row)
+    extra = {"attribution": row_attribution(row), "screen_size": row_screen_size(row)}
     return PairScore(
         reference=reference.label,
         distorted=target.label,
@@ -211,7 +218,7 @@ def pair_of(row: FMQMRow) -> PairScore:
         reverse=row_reverse(row),
         trust=row_trust(row),
         parts=tuple(row_parts(row)),
-        findings={} if attribution is None else {"attribution": attribution},
+        findings={name: found for name, found in extra.items() if found is not None},
     )
 
 

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Normals at the corners of triangles: a mesh's own, or smoothed where edges are not sharp."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..metric.geometry import Floats, Ints, cross, dot
+from ..metric.surface import Surface, triangle_normals
+from .definition import SMOOTH_ANGLE
+
+
+def corner_normals(surface: Surface) -> Floats:
+    """(T, 3, 3) float64 unit normals: the surface's own; smoothed at corners where it has none."""
+    given = surface.normals
+    if given is None:
+        return smoothed_normals(surface)
+    length = np.linalg.norm(given, axis=2, keepdims=True)
+    known = np.isfinite(length) & (length > 0)
+    if known.all():
+        return given / length
+    return np.where(known, given / np.where(known, length, 1), smoothed_normals(surface))
+
+
+def smoothed_normals(surface: Surface) -> Floats:
+    """(T, 3, 3) float64 unit normals: at each corner, the mean of the faces around it up to the next sharp edges.
+
+    Faces count by their area: what a decimated mesh shows of a shape lies in its large faces.
+    """
+    corners = surface.vertices[surface.triangles]
+    weighted = np.repeat(cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), 3, axis=0)
+    flat = triangle_normals(surface.vertices, surface.triangles)
+    fan = _fans(surface, flat)
+    total = np.stack([np.bincount(fan, column, len(fan)) for column in weighted.T], axis=1)[fan]
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    smooth = np.where(length > 0, total / np.where(length > 0, length, 1), np.repeat(flat, 3, axis=0))
+    return smooth.reshape(-1, 3, 3)
+
+
+def _fans(surface: Surface, flat: Floats) -> Ints:
+    """(3 T,) a number for each corner, the same for those at one vertex that edges join which are not sharp."""
+    corner = np.arange(3 * len(flat)).reshape(-1, 3)
+    # Each edge of each triangle, with the corners at its two ends: at the lower vertex first.
+    starts, ends = surface.triangles.ravel(), np.roll(surface.triangles, -1, axis=1).ravel()
+    at_start, at_end = corner.ravel(), np.roll(corner, -1, axis=1).ravel()
+    low, high = np.minimum(starts, ends), np.maximum(starts, ends)
+    at_low, at_high = np.where(starts < ends, at_start, at_end), np.where(starts < ends, at_end, at_start)
+    order = np.argsort(low * len(surface.vertices) + high, kind="stable")
+    one, other = order[:-1], order[1:]
+    joined = (low[one] == low[other]) & (high[one] == high[other])
+    joined &= dot(flat[one // 3], flat[other // 3]) >= np.cos(np.radians(SMOOTH_ANGLE))
+    one, other = one[joined], other[joined]
+    first, second = np.concatenate([at_low[one], at_high[one]]), np.concatenate([at_low[other], at_high[other]])
+    fan = np.arange(3 * len(flat))
+    while True:  # the least number spreads; what points to it is followed twice as far each time
+        least = np.minimum(fan[first], fan[second])
+        spread = fan.copy()
+        np.minimum.at(spread, fan[first], least)
+        np.minimum.at(spread, fan[second], least)
+        spread = spread[spread]
+        if np.array_equal(spread, fan):
+            return fan
+        fan = spread
