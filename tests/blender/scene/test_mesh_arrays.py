@@ -155,7 +155,7 @@ def test_slot_that_is_linked_to_the_object_and_empty_there() -> None:
     object_.material_slots[0].link = "OBJECT"
     is_old = bpy.app.version < (5, 2)
     arrays = mesh_arrays([object_], "asset")
-    assert arrays.materials[0].how == ("read" if is_old else "none") and bool(arrays.warnings) != is_old
+    assert arrays.materials[0].how == ("read" if is_old else "none") and bool(arrays.notes) != is_old
     flatten_objects([object_], alone=True)
     (plain,) = bpy.data.objects
     assert [slot.material and slot.material.name for slot in plain.material_slots] == ["Data" if is_old else None]
