@@ -239,7 +239,7 @@ def test_remarks_name_their_pairs(assets: Path, tmp_path: Path) -> None:
     """Where there are several; a warning of all of them comes once. Below a threshold, each pair has a line."""
     write_torus(tmp_path, "bare")
     rows = [
-        {"reference": "bare.obj", "distorted": "bare.obj", "id": "first"},
+        {"reference": "bare.obj", "distorted": str(assets / SHAKEN[9]), "id": "first"},
         {"reference": "bare.obj", "distorted": str(assets / SHAKEN[9]), "id": "second", "fail_under": 0.999},
         {"reference": "bare.obj", "distorted": "gone.obj", "id": "third"},
     ]
@@ -249,7 +249,7 @@ def test_remarks_name_their_pairs(assets: Path, tmp_path: Path) -> None:
         assert done.returncode == 1
         error, warning, below = (line for line in done.stderr.splitlines() if line.startswith("score.py: "))
         assert error.startswith("score.py: third: ") and error.endswith("gone.obj: no such file")
-        assert warning.startswith("score.py: warning: first and 1 more: bare: ")
+        assert warning.startswith(f"score.py: warning: first and 1 more: {SHAKEN[9]}: its colors differ")
         assert re.fullmatch(r"score.py: second: FMQM 0\.\d{4} is below 0\.999", below)
         assert any(f" {how} second" in done.stderr for how in ("scoring", "scored"))
 
