@@ -25,7 +25,7 @@ from fmqm_addon.metric.settings import PRESETS, Settings
 from fmqm_addon.metric.surface import MeshArrays
 from fmqm_addon.metric.texture import Material, PlainColor
 from fmqm_addon.ui.operators import inputs
-from fmqm_addon.ui.panels import results as panels
+from fmqm_addon.ui.panels import details
 from fmqm_addon.ui.properties.rows import row_attribution
 from tests.blender import scenes
 from tests.blender.script import noise, read_json, score, strict_json, write_png, write_torus
@@ -198,7 +198,7 @@ def measured_and_saved(path: Path) -> list[dict[str, object]]:
 
 
 def said() -> list[str]:
-    """What the panel of the results says."""
+    """What the panel of details says."""
     layout = MagicMock()
     for part in (layout.column, layout.row, layout.split):
         part.return_value = layout
@@ -207,7 +207,7 @@ def said() -> list[str]:
         region=SimpleNamespace(width=400),
         preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)),
     )
-    panels.FMQM_PT_results.draw(SimpleNamespace(layout=layout), context)
+    details.FMQM_PT_details.draw(SimpleNamespace(layout=layout), context)
     return [call.kwargs["text"] for call in layout.label.call_args_list]
 
 
