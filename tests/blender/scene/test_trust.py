@@ -161,7 +161,7 @@ def test_rows_keep_the_report_and_the_other_direction(pair: list[bpy.types.Objec
         wide, narrow = said_at(800), said_at(230)
         assert {"Watertight: no", "Triangles: 968 / 980", "Flipped: 0 % of samples"} <= set(wide)
         assert any(said.startswith("Non-manifold edges") for said in wide)
-        assert any(said.startswith("Base color, compared: ") and said.endswith("32, sRGB") for said in wide)
+        assert any(said.startswith("Base color, LOD: ") and said.endswith("32, sRGB") for said in wide)
         assert not any("distorted" in said or "Baked at" in said for said in wide), "called Compared; nothing was baked"
         place = narrow.index("UV missing: 0 %")
         assert narrow[place + 1] == "of the textured area" and max(map(len, narrow)) <= 30
