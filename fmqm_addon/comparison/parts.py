@@ -20,7 +20,7 @@ from ..metric.perceived import PERCEIVED_COLUMNS
 from ..metric.surface import Surface, triangle_areas
 from .distances import points_at, squared_distances
 from .places import place_name
-from .surface_facts import NO_MATERIAL, Work
+from .surface_facts import NO_MATERIAL, Work, box_of
 
 LISTED = 50  # the largest parts of a kind; and as many others that are gone
 POINTS = 100  # spread over a part; it is gone where more than half of them are far
@@ -143,6 +143,7 @@ def parts_report(
     parts: list[Part] = []
     gone: list[str] = []
     covered = np.zeros(len(reference.triangles), bool)
+    box = box_of(reference.vertices)
     known: list[tuple[Ints, NDArray[np.bool_]]] = []
     for number, group in enumerate(groups):
         area = group.area()
@@ -154,7 +155,7 @@ def parts_report(
         yield (number + 1) / len(groups)
         lost = largest[missing[largest]].tolist()
         listed = list(dict.fromkeys([*largest[:LISTED].tolist(), *lost[:LISTED]]))
-        names = {row: group.names[row] or _place_in_object(reference, group, row) for row in {*listed, *lost}}
+        names = {row: group.names[row] or _place_in_object(reference, box, group, row) for row in {*listed, *lost}}
         scores = _scores(group, result)
         parts += [
             Part(
@@ -259,10 +260,10 @@ def _scores(group: Grouping, result: Result) -> list[tuple[float | None, float |
     ]
 
 
-def _place_in_object(reference: Surface, group: Grouping, row: int) -> str:
-    """The name of a connected part: its object's, its number, and where it is in the reference's box."""
+def _place_in_object(reference: Surface, box: Floats, group: Grouping, row: int) -> str:
+    """The name of a connected part: its object's, its number, and where it is in the reference's (2, 3) box."""
     its = group.triangles(row)
     name = reference.objects[int(reference.object[its[0]])]
     center = (group.low[row] + group.high[row]) / 2
-    place = place_name(center, reference.vertices.min(axis=0), reference.vertices.max(axis=0))
+    place = place_name(center, *box)
     return f"{name}, piece {row + 1} of {len(group.names)} ({place})"
