@@ -19,6 +19,7 @@ from ..metric.evaluation import Result
 from ..metric.fields import Fields
 from ..metric.geometry import Floats, dot
 from ..metric.queries import closest_on
+from ..metric.stepper import as_share
 from ..metric.surface import Surface, triangle_normals
 from ..metric.texture import MISSING, ImageFacts, Material
 from .color_shift import color_shifts
@@ -73,7 +74,7 @@ def assessing(
     own = yield from surface_facts(distorted)
     yield 0.3
     if groups is None:
-        groups = yield from _shares(groupings(reference), 0.3, 0.1)
+        groups = yield from as_share(groupings(reference), 0.3, 0.1)
     compared = ((reference, result.ref), (distorted, result.dist))
     normals = []
     for surface, fields in compared:
@@ -92,9 +93,9 @@ def assessing(
     reach = ADDED_DISTANCE * float(np.median([patch.diagonal for patch in result.patches]))
     seed, count = result.settings.seed, min(POINTS, max(LEAST_POINTS, len(result.samples.positions) // POINTS_SHARE))
     moved = result.ref.nearest - result.dist.nearest  # by more than reach: what it faced is gone
-    there = yield from _shares(apart(reference, distorted, reach, seed, count), 0.5, 0.2)
-    back = yield from _shares(apart(distorted, reference, reach, seed, count), 0.7, 0.2)
-    parts = yield from _shares(parts_report(groups, reference, distorted, result), 0.9, 0.1)
+    there = yield from as_share(apart(reference, distorted, reach, seed, count), 0.5, 0.2)
+    back = yield from as_share(apart(distorted, reference, reach, seed, count), 0.7, 0.2)
+    parts = yield from as_share(parts_report(groups, reference, distorted, result), 0.9, 0.1)
     shifts = color_shifts(result)
     sides = [
         (
@@ -140,17 +141,6 @@ def assessing(
     facts = ((*known, *sides[0]), (*own, *sides[1]))
     warnings, notes = doubts((reference.name, distorted.name), result, facts, pair)
     return Trust(*facts, pair, parts.parts, warnings, notes)
-
-
-def _shares(work: Work[T], first: float, share: float) -> Work[T]:
-    """Work as a part of larger work."""
-    while True:
-        try:
-            done = next(work)
-        except StopIteration as end:
-            result: T = end.value
-            return result
-        yield first + share * done
 
 
 def in_doubt(fields: Fields, points: Floats, normals: Floats) -> NDArray[np.bool_]:

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .geometry import Floats, Ints, cross, dot, ranges
-from .queries import BatchQuery, as_share, closest_on, crossing_counts, nearest_triangles, opened
+from .queries import BatchQuery, closest_on, crossing_counts, nearest_triangles, opened
 from .signs import followers
+from .stepper import as_share
 from .surface import Surface, is_closed, triangle_normals
 
 # Below the resolution of a float32 tree in a box of diagonal 1, p - p_n has no direction: p = p_n.

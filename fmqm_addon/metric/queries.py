@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .geometry import Floats, Ints, closest_on_triangles, cross, dot
+from .stepper import as_share
 from .surface import Surface, SurfaceQuery, finish
 
 T = TypeVar("T")
@@ -47,17 +48,6 @@ class BatchQuery(SurfaceQuery, Protocol):
 
     def one_by_one(self, points: Floats, bounds: Floats) -> Ints:
         """As nearest, by the tree that decides where several triangles are equally near in float32."""
-
-
-def as_share(work: Generator[float, None, T], first: float, share: float) -> Generator[float, None, T]:
-    """Something that yields its own share done, as the part of larger work from first on."""
-    while True:
-        try:
-            done = next(work)
-        except StopIteration as end:
-            result: T = end.value
-            return result
-        yield first + share * done
 
 
 def opened(query: SurfaceQuery) -> AbstractContextManager[None]:

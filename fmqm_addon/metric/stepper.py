@@ -90,3 +90,14 @@ def as_part(
             return result
         own = step if isinstance(step, Progress) else Progress("", step)
         yield Progress(stage or own.stage, first + share * own.done)
+
+
+def as_share(work: Generator[float, None, T], first: float, share: float) -> Generator[float, None, T]:
+    """Something that yields its own share done, as the part of larger work from first on."""
+    while True:
+        try:
+            done = next(work)
+        except StopIteration as end:
+            result: T = end.value
+            return result
+        yield first + share * done
