@@ -49,3 +49,7 @@ def test_split_for_display_is_the_same_surface() -> None:
     assert triangle_areas(fine, cut).sum() == pytest.approx(triangle_areas(vertices, triangles).sum())
     same, whole = split_large(vertices, triangles, 6.0)
     assert same is vertices and whole is triangles
+
+
+def test_ticks_from_zero_begin_at_0_and_not_at_minus_0() -> None:
+    assert str(round_ticks(0.0, 1.0)[0]) == "0.0"

@@ -124,7 +124,7 @@ def round_ticks(low: float, high: float) -> list[float]:
     """Round numbers between two ends, both included where they are round: three to seven."""
     step = _round_step(high - low)
     first, last = np.ceil(low / step - 1e-6), np.floor(high / step + 1e-6)
-    return [round(float(k * step), 9) for k in np.arange(first, last + 1)]
+    return [round(float(k * step), 9) + 0.0 for k in np.arange(first, last + 1)]  # no -0
 
 
 def histogram(values: Sequence[float] | Floats, low: float, high: float, bars: int = BARS) -> NDArray[np.int64]:
