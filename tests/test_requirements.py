@@ -47,6 +47,8 @@ def test_the_ranges_hold_what_is_tested() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     ranges = [*project["dependencies"], *(name for part in project["optional-dependencies"].values() for name in part)]
     tested = pins("requirements") + pins("requirements-cluster")
+    evidence = {Requirement(each).name for each in project["optional-dependencies"]["evidence"]}
+    tested += [pin for pin in pins("requirements-dev") if pin.name in evidence]
     assert {Requirement(each).name for each in ranges} == {pin.name for pin in tested}
     for each in map(Requirement, ranges):
         same = [pin for pin in tested if pin.name == each.name and (not each.marker or pin.marker == each.marker)]
