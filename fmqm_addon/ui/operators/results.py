@@ -9,8 +9,11 @@ import bpy
 from bpy.props import EnumProperty
 
 from ...report.records import table_text
-from ..properties.rows import EXPLAINED, active_row, is_whole, pair_of, row_scores
+from ...report.words import LABELS, MEANINGS
+from ..properties.rows import active_row, is_whole, pair_of, row_scores
 from ..view.shown import forget_removed
+
+_COLUMNS = [(name, label, MEANINGS[name]) for name, label in LABELS.items()]
 
 
 def has_rows(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
@@ -33,12 +36,12 @@ class FMQM_OT_sort_rows(bpy.types.Operator):  # noqa: N801
     column: EnumProperty(
         name="Column",
         description="Number to sort by",
-        items=[(name, label, text) for name, (label, text) in EXPLAINED.items()],
+        items=_COLUMNS,
     )
 
     @classmethod
     def description(cls, _: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
-        return f"{EXPLAINED[properties.column][1]}.\nClick to sort the results by it, again for the other direction"
+        return f"{MEANINGS[properties.column]}.\nClick to sort the results by it, again for the other direction"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

@@ -8,8 +8,8 @@ from typing import ClassVar
 import bpy
 
 from ...comparison.judge import Judge
+from ...report.words import LABELS
 from ..operators.decimate import FMQM_OT_decimate
-from ..properties.rows import EXPLAINED
 from .sidebar import Sidebar
 
 
@@ -23,7 +23,7 @@ class FMQM_PT_decimate(Sidebar, bpy.types.Panel):  # noqa: N801
     def draw(self, context: bpy.types.Context) -> None:
         layout, decimate = self.layout, context.scene.fmqm.decimate
         layout.use_property_split, layout.use_property_decorate = True, False
-        label = f"Target {EXPLAINED[Judge[context.scene.fmqm.judge].column][0]}"
+        label = f"Target {LABELS[Judge[context.scene.fmqm.judge].column]}"
         layout.prop(decimate, "target", text=label, slider=True)
         row = layout.row(heading="Max Triangles")
         row.prop(decimate, "limited", text="")

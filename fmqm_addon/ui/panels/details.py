@@ -11,8 +11,8 @@ from ...comparison.alignment import SPACE_LABELS
 from ...comparison.judge import Judge
 from ...report.explain import verdict
 from ...report.records import pair_record, size_text
+from ...report.words import LABELS
 from ..properties.rows import (
-    EXPLAINED,
     FMQMRow,
     active_row,
     is_whole,
@@ -68,20 +68,20 @@ def _draw_scores(column: bpy.types.UILayout, row: FMQMRow) -> None:
     scores, stderr, reverse = row_scores(row), row_stderr(row), row_reverse(row)
     if scores is None:
         return
-    for name in EXPLAINED:
+    for name in LABELS:
         if name == "perceived":
             column.separator()
         split = column.split(factor=0.5, align=True)
         label = split.row()
         label.alignment = "LEFT"
-        label.operator("fmqm.sort_rows", text=EXPLAINED[name][0], emboss=False).column = name
+        label.operator("fmqm.sort_rows", text=LABELS[name], emboss=False).column = name
         error = f" ± {stderr[name]:.4f}" if stderr else ""
         split.label(text=f"{scores[name]:.4f}{error}")
     if reverse is None:
         return
     for judge in Judge:
         split = column.split(factor=0.5, align=True)
-        split.label(text=f"    {EXPLAINED[judge.column][0]} Reversed")
+        split.label(text=f"    {LABELS[judge.column]} Reversed")
         split.label(text=f"{judge.score(reverse):.4f}")
 
 

@@ -10,9 +10,9 @@ import bpy
 from ...comparison.judge import Judge
 from ...report.explain import verdict
 from ...report.records import pair_record
+from ...report.words import LABELS
 from .. import session
 from ..properties.rows import (
-    EXPLAINED,
     FMQMRow,
     active_row,
     comparable,
@@ -188,16 +188,14 @@ def _draw_verdict(layout: bpy.types.UILayout, context: bpy.types.Context, fmqm: 
     for judge in Judge:
         was = "" if former is None else f", was {former[judge.column]:.2f}"
         split = numbers.split(factor=0.4)
-        split.label(text=EXPLAINED[judge.column][0])
+        split.label(text=LABELS[judge.column])
         split.label(text=f"{scores[judge.column]:.4f}{was}")
     bars = box.column(align=True)
     for name in Judge[fmqm.judge].features:
         split = bars.split(factor=0.5)
         label = split.row()
         label.alignment = "LEFT"
-        label.operator(
-            "fmqm.sort_rows", text=EXPLAINED[name][0], emboss=False, icon_value=swatch(scores[name])
-        ).column = name
+        label.operator("fmqm.sort_rows", text=LABELS[name], emboss=False, icon_value=swatch(scores[name])).column = name
         split.progress(factor=scores[name], text=f"{scores[name]:.2f}")
     if row.uid in session.stale:
         wrapped(layout, context, session.stale[row.uid], icon="FILE_REFRESH")

@@ -17,42 +17,12 @@ from ...blender.scene.target import Target
 from ...comparison.measurement import Readings
 from ...metric.evaluation import Scores
 from ...metric.perceived import Perceived
-from ...metric.settings import PRESETS, SETTING_NAMES, Settings
+from ...metric.settings import SETTING_NAMES
 from ...report.record_check import record_fault
-from ...report.records import PERCEIVED, SHOWN, PairScore, pair_record
+from ...report.records import PERCEIVED, PairScore, pair_record
 from ...report.trust_table import Report
+from ...report.words import preset_label
 from .. import stored_text
-
-PRESET_LABELS = {"paper": "Full", "fast": "Quick"}
-assert set(PRESET_LABELS) == set(PRESETS)
-
-# What an artist should know of each number: label, and what a low value looks like.
-EXPLAINED = {
-    "FMQM": ("FMQM", "The paper's score, 0 to 1: mean over all patches. 1 is the same as the original"),
-    "geoSSIM": (
-        "geoSSIM",
-        "Shape: distances to the surface. Low where the surface has moved, shrunk or lost its bumps",
-    ),
-    "geoGraSSIM": (
-        "geoGraSSIM",
-        "Facing: directions to the surface. Low where it is bent or faceted, so that its normals point elsewhere",
-    ),
-    "colorSSIM": (
-        "colorSSIM",
-        "Color: colors around a point. Low where the texture is blurred, shifted, tinted or compressed",
-    ),
-    "colorGraSSIM": (
-        "colorGraSSIM",
-        "Detail: the steepest color changes. Low where edges in the texture have moved, softened or broken up",
-    ),
-    "perceived": ("Perceived", "Whether people would see it, 0 to 1: mean over all patches. 1 is the same"),
-    "shape": ("Shape", "Distances to the surface. Low where the surface has moved, shrunk or lost its bumps"),
-    "facing": ("Facing", "Directions to the surface. Low where it is bent or faceted, and shades otherwise"),
-    "color": ("Color", "Colors around a point. Low where colors or contrasts have changed visibly"),
-    "detail": ("Detail", "Slopes of the colors. Low where the texture is blurred, moved or broken up"),
-    "perceived_p10": ("Worst Tenth", "A tenth of the patches has a perceived quality below this"),
-}
-assert set(EXPLAINED) == {*SHOWN, *PERCEIVED}
 
 
 class FMQMRow(bpy.types.PropertyGroup):
@@ -107,7 +77,7 @@ def row_readings(row: FMQMRow) -> Readings | None:
 
 
 def row_scores(row: FMQMRow) -> dict[str, float] | None:
-    """All numbers of both readings by the names of EXPLAINED; None for a row with an error."""
+    """All numbers of both readings by the names of report.words.LABELS; None for a row with an error."""
     readings = row_readings(row)
     return None if readings is None else _numbers(readings.scores, readings.perceived)
 
@@ -157,14 +127,8 @@ def row_parts(row: FMQMRow) -> list[dict[str, Any]]:
 
 def settings_name(row: FMQMRow) -> str:
     """The preset that a row was measured with, or Custom."""
-    used = _settings_that_count(row)
-    if used is None:
-        return "?"
-    for name, values in PRESETS.items():
-        preset = Settings(**values).as_dict()
-        if all(preset[each] == value for each, value in used.items()):
-            return PRESET_LABELS[name]
-    return "Custom"
+    used = stored_text.read_settings(row.settings)
+    return "?" if used is None else preset_label(used)
 
 
 def is_quick(row: FMQMRow) -> bool:
