@@ -8,7 +8,7 @@ a file is wanted, as that file holds them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -220,9 +220,7 @@ class Search:
         return step
 
 
-def last_passing(
-    count: int, passes: Callable[[int], Generator[Progress, None, bool]], start: int, stride: int, apart: int = 1
-) -> Work[int]:
+def last_passing(count: int, passes: Callable[[int], Work[bool]], start: int, stride: int, apart: int = 1) -> Work[int]:
     """The last of `count` indices that passes, next to one that does not; -1 where index 0 does not pass.
 
     With apart, one that passes where one that does not is at most so many further.

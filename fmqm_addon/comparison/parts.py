@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 from ..metric.evaluation import COLUMNS, Result
 from ..metric.geometry import Floats, Ints
 from ..metric.perceived import PERCEIVED_COLUMNS
+from ..metric.stepper import Progress, Work
 from ..metric.surface import Surface, triangle_areas
 from .distances import points_at, squared_distances
 from .places import place_name
-from .surface_facts import NO_MATERIAL, Work, box_of
+from .surface_facts import NO_MATERIAL, box_of
 
 LISTED = 50  # the largest parts of a kind; and as many others that are gone
 POINTS = 100  # spread over a part; it is gone where more than half of them are far
@@ -102,9 +103,9 @@ class PartsReport:
 def groupings(surface: Surface) -> Work[tuple[Grouping, ...]]:
     """A surface by objects, connected parts and materials; yields the share done."""
     areas = triangle_areas(surface.vertices, surface.triangles)
-    yield 0.2
+    yield Progress("", 0.2)
     connected = connected_parts(surface.triangles)
-    yield 0.6
+    yield Progress("", 0.6)
     names = [material.name or NO_MATERIAL for material in surface.materials]
     materials = list(dict.fromkeys(names))  # baked for several objects it is one all the same
     by_name = np.array([materials.index(name) for name in names])[surface.material]
@@ -152,7 +153,7 @@ def parts_report(
         if missing is None:  # often each object is one connected part
             missing = yield from _missing(group, largest[:MOST], reference, distorted, result.settings.seed)
             known.append((group.label, missing))
-        yield (number + 1) / len(groups)
+        yield Progress("", (number + 1) / len(groups))
         lost = largest[missing[largest]].tolist()
         listed = list(dict.fromkeys([*largest[:LISTED].tolist(), *lost[:LISTED]]))
         names = {row: group.names[row] or _place_in_object(reference, box, group, row) for row in {*listed, *lost}}
@@ -239,7 +240,7 @@ def _far_share(
         points = points_at(reference, group.order[place.ravel()], rng)
         away = squared_distances(distorted, points).reshape(len(here), count)
         share[begin : begin + at_once] = (away > reach[here, None]).mean(axis=1)
-        yield 0.0
+        yield Progress("", 0.0)
     return share
 
 

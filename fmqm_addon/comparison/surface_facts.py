@@ -6,14 +6,14 @@ The metric answers with a number whatever it is given; these facts say what it w
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..metric.geometry import Floats, Ints, ranges
+from ..metric.stepper import Progress, Work
 from ..metric.surface import Surface, triangle_areas
 from ..metric.texture import ImageFacts
 
@@ -23,9 +23,6 @@ UV_GRIDS = (512, 256, 128, 64)  # cells a side of the texture; the first one tha
 UV_CELLS = 700_000  # cells to look at
 _UV_SHIFT = (0.3819660113, 0.7236067977)  # of the cells' centers: no edge of a usual UV map runs through these
 _CHUNK = 1 << 17  # cells of a step
-
-T = TypeVar("T")
-Work = Generator[float, None, T]
 
 
 @dataclass(frozen=True)
@@ -47,12 +44,12 @@ def surface_facts(surface: Surface) -> Work[tuple[Fact, ...]]:
     """What is known of a surface without a comparison; yields the share done, 0 to 0.4."""
     preparation = surface.preparation
     open_edges, non_manifold = edge_counts(surface.triangles)
-    yield 0.1
+    yield Progress("", 0.1)
     areas = triangle_areas(surface.vertices, surface.triangles)
     layers, uv = _textured(surface)
-    yield 0.2
+    yield Progress("", 0.2)
     overlapping = yield from overlapping_share(uv, layers[layers >= 0])
-    yield 0.3
+    yield Progress("", 0.3)
     return (
         Fact("triangles", preparation.given, "triangles"),
         Fact("triangles_used", len(surface.triangles), "triangles"),
@@ -91,11 +88,11 @@ def overlapping_share(uv: Floats, layers: Ints) -> Work[float | None]:
         uv: (T, 3, 2) finite texture coordinates. layers: (T,) which texture; only those of one overlap.
     """
     tile = np.floor(_low(uv))
-    yield 0.3
+    yield Progress("", 0.3)
     for side in UV_GRIDS:
         first, last = np.ceil((_low(uv) - tile) * side - _UV_SHIFT), np.floor((_high(uv) - tile) * side - _UV_SHIFT)
         width, height = np.maximum(last - first + 1, 0).T
-        yield 0.3
+        yield Progress("", 0.3)
         if float((width * height).sum()) <= UV_CELLS:
             break
     else:
@@ -110,7 +107,7 @@ def overlapping_share(uv: Floats, layers: Ints) -> Work[float | None]:
         corners = (uv[group] - tile[group, None]) * side - _UV_SHIFT
         inside = _inside(corners, row, x.astype(np.float64), y.astype(np.float64))
         used_keys.append(((layers[group[row]] * side + y % side) * side + x % side)[inside])
-        yield 0.3
+        yield Progress("", 0.3)
     keys, times = np.unique(np.concatenate(used_keys or [np.empty(0, np.int64)]), return_counts=True)
     return float(np.count_nonzero(times > 1) / len(keys)) if len(keys) else None
 

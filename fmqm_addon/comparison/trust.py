@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,14 +18,14 @@ from ..metric.evaluation import Result
 from ..metric.fields import Fields
 from ..metric.geometry import Floats, dot
 from ..metric.queries import closest_on
-from ..metric.stepper import as_share
+from ..metric.stepper import Progress, Work, as_part
 from ..metric.surface import Surface, triangle_normals
 from ..metric.texture import MISSING, ImageFacts, Material
 from .color_shift import color_shifts
 from .distances import POINTS, Apart, apart
 from .doubts import doubts
 from .parts import Grouping, Part, groupings, parts_report
-from .surface_facts import NO_MATERIAL, Fact, Work, all_images, box_of, surface_facts
+from .surface_facts import NO_MATERIAL, Fact, all_images, box_of, surface_facts
 
 FLIPPED_COSINE = -0.5  # between the faces nearest to a sample, which noise and decimation turn by less. The metric
 # squares cosines and cannot see it
@@ -37,8 +36,6 @@ OPAQUE = 0.5  # a lower alpha is see-through
 COLOR_UNIT = "CIE 1976 difference, 2.3 is just noticeable"
 _SEEN = 1 << 14  # samples of a step
 _SEEN_ROLES = {"base color", "alpha"}
-
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -72,20 +69,20 @@ def assessing(
         known: surface_facts of the reference. groups: groupings of it. They serve all its comparisons; None: made here.
     """
     own = yield from surface_facts(distorted)
-    yield 0.3
+    yield Progress("", 0.3)
     if groups is None:
-        groups = yield from as_share(groupings(reference), 0.3, 0.1)
+        groups = yield from as_part(groupings(reference), 0.3, 0.1)
     compared = ((reference, result.ref), (distorted, result.dist))
     normals = []
     for surface, fields in compared:
         normals.append(triangle_normals(surface.vertices, surface.triangles.take(fields.triangle, axis=0)))
-        yield 0.4
+        yield Progress("", 0.4)
     doubtful = [
         in_doubt(fields, result.samples.positions, normal)
         for (_, fields), normal in zip(compared, normals, strict=True)
     ]
     differs = (result.ref.sdf < 0) != (result.dist.sdf < 0)
-    yield 0.4
+    yield Progress("", 0.4)
     alphas = []
     for surface, fields in compared:
         alphas.append((yield from _alphas(surface, fields)))
@@ -93,9 +90,9 @@ def assessing(
     reach = ADDED_DISTANCE * float(np.median([patch.diagonal for patch in result.patches]))
     seed, count = result.settings.seed, min(POINTS, max(LEAST_POINTS, len(result.samples.positions) // POINTS_SHARE))
     moved = result.ref.nearest - result.dist.nearest  # by more than reach: what it faced is gone
-    there = yield from as_share(apart(reference, distorted, reach, seed, count), 0.5, 0.2)
-    back = yield from as_share(apart(distorted, reference, reach, seed, count), 0.7, 0.2)
-    parts = yield from as_share(parts_report(groups, reference, distorted, result), 0.9, 0.1)
+    there = yield from as_part(apart(reference, distorted, reach, seed, count), 0.5, 0.2)
+    back = yield from as_part(apart(distorted, reference, reach, seed, count), 0.7, 0.2)
+    parts = yield from as_part(parts_report(groups, reference, distorted, result), 0.9, 0.1)
     shifts = color_shifts(result)
     sides = [
         (
@@ -260,7 +257,7 @@ def _alphas(surface: Surface, fields: Fields) -> Work[Floats]:
         triangle = fields.triangle[batch]
         _, weights = closest_on(surface, fields.nearest[batch], triangle)
         alphas[batch] = surface.alpha_at(triangle, weights)
-        yield 0.5
+        yield Progress("", 0.5)
     return alphas
 
 

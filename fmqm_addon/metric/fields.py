@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .geometry import Floats, Ints, cross, dot, ranges
 from .queries import BatchQuery, closest_on, crossing_counts, nearest_triangles, opened
 from .signs import followers
-from .stepper import as_share
+from .stepper import Progress, Work, as_part
 from .surface import Surface, is_closed, triangle_normals
 
 # Below the resolution of a float32 tree in a box of diagonal 1, p - p_n has no direction: p = p_n.
@@ -40,9 +40,7 @@ class Fields:
     ncf: NDArray[np.float32]
 
 
-def evaluate_fields(
-    surface: Surface, points: Floats, order: Ints, reach: Floats | None = None
-) -> Generator[float, None, Fields]:
+def evaluate_fields(surface: Surface, points: Floats, order: Ints, reach: Floats | None = None) -> Work[Fields]:
     """Equations (3), (4) and (7) at the points; yields the share done.
 
     Args:
@@ -56,7 +54,7 @@ def evaluate_fields(
     points = points.take(order, axis=0)  # in this order all below looks at rows that lie together
     with opened(surface.query):
         finding = nearest_triangles(surface, points, None if reach is None else reach.take(order))
-        triangle = yield from as_share(finding, 0.0, 0.35)
+        triangle = yield from as_part(finding, 0.0, 0.35)
         again = surface.query.one_by_one if isinstance(surface.query, BatchQuery) else None
         nearest = np.empty_like(points)
         ncf = np.empty(points.shape, np.float32)
@@ -64,7 +62,7 @@ def evaluate_fields(
             batch = slice(first, first + _SURFACE_BATCH)
             triangle[batch], nearest[batch], weights = _settled(surface, points[batch], triangle[batch], again)
             ncf[batch] = surface.color_at(triangle[batch], weights)
-            yield 0.35 + 0.1 * min(1.0, (first + _SURFACE_BATCH) / len(order))
+            yield Progress("", 0.35 + 0.1 * min(1.0, (first + _SURFACE_BATCH) / len(order)))
         away = points - nearest
         sdf = np.sqrt(dot(away, away))
         on_surface = sdf <= ON_SURFACE
@@ -77,12 +75,12 @@ def evaluate_fields(
             asked, as_asked = off_surface, np.arange(len(off_surface))
         else:
             following = followers(points.take(off_surface, axis=0), sdf.take(off_surface))
-            leader = yield from as_share(following, 0.45, 0.1)
+            leader = yield from as_part(following, 0.45, 0.1)
             leads = leader == np.arange(len(leader))
             asked, as_asked = off_surface[leads], (np.cumsum(leads) - 1).take(leader)
         directions = away.take(asked, axis=0) / sdf.take(asked)[:, None]
         counting = crossing_counts(surface, points.take(asked, axis=0), directions, closed)
-        crossings = yield from as_share(counting, 0.55, 0.45)
+        crossings = yield from as_part(counting, 0.55, 0.45)
         sdf[off_surface[(crossings % 2 == 1).take(as_asked)]] *= -1
     back = np.empty_like(order)
     back[order] = np.arange(len(order))

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from .geometry import Floats, Ints, dot, morton_order, ranges
 from .settings import Settings
+from .stepper import Progress, Work
 from .surface import Surface, triangle_areas
 
 FPS_TIE = 1e-5  # V-B: distances this close, relatively, are equal; the lowest vertex index wins
@@ -60,7 +61,7 @@ class Patch:
     extended: bool
 
 
-def build_patch_mesh(surface: Surface, n_patches: int) -> Generator[float, None, PatchMesh]:
+def build_patch_mesh(surface: Surface, n_patches: int) -> Work[PatchMesh]:
     """Triangles of the reference; the edges of large ones are split where there are fewer vertices than patches.
 
     Then the edges of all triangles above S_global / (4 n_patches) are halved until none is; otherwise nothing
@@ -70,7 +71,7 @@ def build_patch_mesh(surface: Surface, n_patches: int) -> Generator[float, None,
     vertices, triangles = surface.vertices, surface.triangles
     parent = np.arange(len(triangles))
     areas = triangle_areas(vertices, triangles)
-    yield 0.2
+    yield Progress("", 0.2)
     was_split = False
     if len(vertices) < n_patches:
         limit = float(areas.sum()) / n_patches / SPLIT_BELOW * (1 + AREA_ROUNDING)
@@ -78,7 +79,7 @@ def build_patch_mesh(surface: Surface, n_patches: int) -> Generator[float, None,
             was_split = True
             vertices, triangles, cut_from = split_edges(vertices, triangles, areas > limit)
             parent = parent[cut_from]
-            yield 0.5
+            yield Progress("", 0.5)
             areas = triangle_areas(vertices, triangles)
     return PatchMesh(vertices, triangles, areas, parent, was_split)
 

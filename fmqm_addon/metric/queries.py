@@ -4,18 +4,15 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Generator
 from contextlib import AbstractContextManager
-from typing import Protocol, TypeVar, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .geometry import Floats, Ints, closest_on_triangles, cross, dot
-from .stepper import as_share
-from .surface import Surface, SurfaceQuery, finish
-
-T = TypeVar("T")
+from .stepper import Progress, Work, as_part, finish
+from .surface import Surface, SurfaceQuery
 
 # A ray goes on this far behind a hit, some float32 steps, so as not to find the same place again.
 RAY_STEP = 1e-6
@@ -60,7 +57,7 @@ def batch_size(query: SurfaceQuery) -> int:
     return query.batch if isinstance(query, BatchQuery) else _BATCH
 
 
-def nearest_triangles(surface: Surface, points: Floats, reach: Floats | None) -> Generator[float, None, Ints]:
+def nearest_triangles(surface: Surface, points: Floats, reach: Floats | None) -> Work[Ints]:
     """(N,) the triangle that is nearest to each point, up to float32; yields the share done.
 
     Args:
@@ -73,7 +70,7 @@ def nearest_triangles(surface: Surface, points: Floats, reach: Floats | None) ->
         for first in range(0, len(points), size):
             here = slice(first, first + size)
             triangle[here] = query.nearest(points[here], None if reach is None else loosened(reach[here]))
-            yield min(1.0, (first + size) / len(points))
+            yield Progress("", min(1.0, (first + size) / len(points)))
         return triangle
     order, looked_up = np.arange(len(points)), 0
     for index, chosen in enumerate(_coarse_to_fine(order)):
@@ -87,7 +84,7 @@ def nearest_triangles(surface: Surface, points: Floats, reach: Floats | None) ->
                 bounds = np.linalg.norm(points[batch] - closest_on(surface, points[batch], guide)[0], axis=1)
             triangle[batch] = query.nearest(points[batch], loosened(bounds))
             looked_up += len(batch)
-            yield looked_up / len(points)
+            yield Progress("", looked_up / len(points))
     return triangle
 
 
@@ -96,9 +93,7 @@ def loosened(bounds: Floats) -> Floats:
     return bounds * (1 + BOUND_SLACK) + BOUND_MARGIN
 
 
-def crossing_counts(
-    surface: Surface, origins: Floats, directions: Floats, closed: bool
-) -> Generator[float, None, Ints]:
+def crossing_counts(surface: Surface, origins: Floats, directions: Floats, closed: bool) -> Work[Ints]:
     """(N,) how often the rays cross the surface, by a tree or, in a soup, without; yields the share done.
 
     Odd is inside (III-B).
@@ -115,7 +110,7 @@ def crossing_counts(
     for first in range(0, len(origins), size):
         here = slice(first, first + size)
         count[here] = count_crossings_of_all(surface, origins[here], directions[here])
-        yield min(1.0, (first + size) / len(origins))
+        yield Progress("", min(1.0, (first + size) / len(origins)))
     return count
 
 
@@ -124,27 +119,27 @@ def count_crossings(surface: Surface, origins: Floats, directions: Floats) -> In
     return finish(counting_crossings(surface, origins, directions))
 
 
-def counting_crossings(surface: Surface, origins: Floats, directions: Floats) -> Generator[float, None, Ints]:
+def counting_crossings(surface: Surface, origins: Floats, directions: Floats) -> Work[Ints]:
     """(N,) how often the rays cross the surface; yields the share done."""
     count, _ = yield from _counting(surface, origins, directions, False)
     return count
 
 
-def careful_counts(surface: Surface, origins: Floats, directions: Floats) -> Generator[float, None, Ints]:
+def careful_counts(surface: Surface, origins: Floats, directions: Floats) -> Work[Ints]:
     """As counting_crossings, on a closed surface, where no direction matters.
 
     Near a fold a ray may leave again within the step that it takes behind a hit. Looking back tells such rays; they
     are counted in directions that differ a little. A few that meet folds in all of them are tested against every
     triangle; many, as where sheets coincide, keep their first count.
     """
-    count, folded = yield from as_share(_counting(surface, origins, directions, True), 0.0, 1.0)
+    count, folded = yield from _counting(surface, origins, directions, True)
     doubtful = np.flatnonzero(folded)
     for axis in _TILTS:
         if not doubtful.size:
             return count
         tilted = directions[doubtful] + cross(directions[doubtful], np.tile(axis, (len(doubtful), 1)))
         tilted /= np.linalg.norm(tilted, axis=1, keepdims=True)
-        found, folded = yield from as_share(_counting(surface, origins[doubtful], tilted, True), 1.0, 0.0)
+        found, folded = yield from as_part(_counting(surface, origins[doubtful], tilted, True), 1.0, 0.0)
         count[doubtful[~folded]] = found[~folded]
         doubtful = doubtful[folded]
     if len(doubtful) * len(surface.triangles) <= _RAY_TESTS:
@@ -154,7 +149,7 @@ def careful_counts(surface: Surface, origins: Floats, directions: Floats) -> Gen
 
 def _counting(
     surface: Surface, origins: Floats, directions: Floats, look_back: bool
-) -> Generator[float, None, tuple[Ints, NDArray[np.bool_]]]:
+) -> Work[tuple[Ints, NDArray[np.bool_]]]:
     """(N,) crossings, and (N,) whether, looking back, a ray has found another triangle within the step behind a hit.
 
     Yields the share done. A ray crosses a triangle once: when the tree finds the last triangle again, rounding held
@@ -183,7 +178,7 @@ def _counting(
             behind, _ = query.first_hit(_along(origins, travelled, directions, rays), -directions[rays])
             folded[rays] |= behind != triangle
         going = np.concatenate([waiting, rays])
-        yield (begun - going.size / 2) / len(origins)
+        yield Progress("", (begun - going.size / 2) / len(origins))
     return count, folded
 
 

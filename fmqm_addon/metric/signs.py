@@ -15,11 +15,10 @@ sample has a ray of its own: on its closed parts too, since rays meet all of it.
 
 from __future__ import annotations
 
-from collections.abc import Generator
-
 import numpy as np
 
 from .geometry import Floats, Ints, dot
+from .stepper import Progress, Work
 
 # Samples before each one, along a curve, that are looked at: with 16 a quarter is left that needs a ray.
 PREDECESSORS = 16
@@ -28,7 +27,7 @@ BALL_SLACK, BALL_MARGIN = 1e-4, 1e-6
 _BATCH = 1 << 15  # samples of a step
 
 
-def followers(points: Floats, distances: Floats) -> Generator[float, None, Ints]:
+def followers(points: Floats, distances: Floats) -> Work[Ints]:
     """(N,) for each of (N, 3) points the one whose sign it has, itself where it needs a ray; yields the share done.
 
     Args:
@@ -47,7 +46,7 @@ def followers(points: Floats, distances: Floats) -> Generator[float, None, Ints]
             together = dot(apart, apart) < reach * reach
             leader[alone[together]] = before[together]
             alone = alone[~together]
-        yield min(1.0, (first + _BATCH) / len(points))
+        yield Progress("", min(1.0, (first + _BATCH) / len(points)))
     while True:  # the leader's leader, until there is none above
         above = leader.take(leader)
         if np.array_equal(above, leader):

@@ -13,7 +13,10 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Progress:
-    """What a step has worked on, and the share of the whole stepper that is done, in [0, 1]."""
+    """What a step has worked on, and the share of the whole stepper that is done, in [0, 1].
+
+    The stage is "" in work that has only one: what it is a part of names it.
+    """
 
     stage: str
     done: float
@@ -71,33 +74,23 @@ class Stepper(Generic[T]):
         self._done = True
 
 
-def as_part(
-    part: Stepper[T] | Generator[Progress | float, None, T], first: float, share: float, stage: str | None = None
-) -> Work[T]:
+def as_part(part: Stepper[T] | Work[T], first: float, share: float, stage: str | None = None) -> Work[T]:
     """The steps of something smaller as a part of larger work; ends in its result.
 
     Args:
-        part: a stepper, or a generator of its progress; one that knows no stages yields the share done alone.
         first, share: where in the larger work it begins, and how much of that it is.
         stage: what all of its steps are called; None: as it calls them.
     """
-    work: Generator[Progress | float, None, T] = part.steps() if isinstance(part, Stepper) else part
+    work = part.steps() if isinstance(part, Stepper) else part
     while True:
         try:
             step = next(work)
         except StopIteration as end:
             result: T = end.value
             return result
-        own = step if isinstance(step, Progress) else Progress("", step)
-        yield Progress(stage or own.stage, first + share * own.done)
+        yield Progress(stage or step.stage, first + share * step.done)
 
 
-def as_share(work: Generator[float, None, T], first: float, share: float) -> Generator[float, None, T]:
-    """Something that yields its own share done, as the part of larger work from first on."""
-    while True:
-        try:
-            done = next(work)
-        except StopIteration as end:
-            result: T = end.value
-            return result
-        yield first + share * done
+def finish(work: Work[T]) -> T:
+    """What work ends in, all of it at once."""
+    return Stepper(work).run()

@@ -3,18 +3,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .errors import MeshError
 from .geometry import Floats, Ints, cross, dot
+from .stepper import Progress, Work, finish
 from .texture import Material
-
-T = TypeVar("T")
 
 # Heights of triangles below this many float64 roundings of the position count as zero area.
 FLAT_ROUNDINGS = 8
@@ -213,19 +212,7 @@ def prepare_surface(mesh: MeshArrays, build_query: QueryBuilder, frame: Frame | 
     return finish(preparing_surface(mesh, build_query, frame))
 
 
-def finish(work: Generator[Any, None, T]) -> T:
-    """What a generator returns once it has yielded all it has."""
-    while True:
-        try:
-            next(work)
-        except StopIteration as end:
-            result: T = end.value
-            return result
-
-
-def preparing_surface(
-    mesh: MeshArrays, build_query: QueryBuilder, frame: Frame | None = None
-) -> Generator[float, None, Surface]:
+def preparing_surface(mesh: MeshArrays, build_query: QueryBuilder, frame: Frame | None = None) -> Work[Surface]:
     """Weld, drop what cannot be measured, move to the metric's frame, index; yields the share done.
 
     Args:
@@ -257,18 +244,18 @@ def preparing_surface(
     if not np.isfinite(world).all():
         finite = np.isfinite(world).all(axis=1)
         not_finite = keep(finite[triangles].all(axis=1), "have coordinates that are not finite", warnings)
-    yield 0.1
+    yield Progress("", 0.1)
     world, triangles = _used_only(world, triangles)
     if frame is None:
         frame = _frame_of(world, mesh.name)
-    yield 0.2
+    yield Progress("", 0.2)
     positions, triangles = weld(frame.enter(world), triangles)
     welded = len(world) - len(positions)
-    yield 0.4
+    yield Progress("", 0.4)
     flat = keep(~_is_flat(positions, triangles, frame), "have zero area", notes)
-    yield 0.5
+    yield Progress("", 0.5)
     repeated = keep(_is_first(triangles), "repeat another triangle", notes)
-    yield 0.6
+    yield Progress("", 0.6)
     vertices, triangles = _used_only(positions, triangles)
 
     corners = np.asarray(mesh.corners, np.float64)[source]
@@ -276,7 +263,7 @@ def preparing_surface(
         strange = np.count_nonzero(~np.isfinite(corners).all(axis=(1, 2)))
         warnings.append(f"{mesh.name}: {strange} triangles have UVs or colors that are not finite; taken as 0")
         corners = np.where(np.isfinite(corners), corners, 0.0)
-    yield 0.7
+    yield Progress("", 0.7)
     return Surface(
         name=mesh.name,
         frame=frame,

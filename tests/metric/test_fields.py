@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from typing import TypeVar
 
 import numpy as np
@@ -15,6 +14,7 @@ from fmqm_addon.metric import fields, queries
 from fmqm_addon.metric.fields import Fields, evaluate_fields
 from fmqm_addon.metric.geometry import Floats, Ints, morton_order
 from fmqm_addon.metric.queries import _coarse_to_fine, _guide, count_crossings, count_crossings_of_all
+from fmqm_addon.metric.stepper import Work
 from fmqm_addon.metric.surface import MeshArrays, Surface, prepare_surface
 from fmqm_addon.metric.texture import PlainColor
 
@@ -26,11 +26,11 @@ CLOSED = {"tetrahedron": TETRAHEDRON, "cube": cube(1), "cut cube": cube(2), "ico
 T = TypeVar("T")
 
 
-def result_of(work: Generator[float, None, T]) -> T:
+def result_of(work: Work[T]) -> T:
     done = 0.0
     while True:
         try:
-            now = next(work)
+            now = next(work).done
         except StopIteration as end:
             return end.value  # type: ignore[no-any-return]
         assert done <= now <= 1

@@ -20,7 +20,8 @@ from fmqm_addon.metric.patches import (
     split_edges,
 )
 from fmqm_addon.metric.settings import Settings
-from fmqm_addon.metric.surface import finish, triangle_areas, triangle_normals
+from fmqm_addon.metric.stepper import finish
+from fmqm_addon.metric.surface import triangle_areas, triangle_normals
 
 from .meshes import TETRAHEDRON, TRIANGLE, cube, grid, icosahedron, sphere, surface
 from .oracles import farthest_points_by_loop, grow_with_sets

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from fmqm_addon.metric.fields import Fields, evaluate_fields
 from fmqm_addon.metric.geometry import Floats, Ints, morton_order
 from fmqm_addon.metric.signs import followers
-from fmqm_addon.metric.surface import Surface, finish, is_closed
+from fmqm_addon.metric.stepper import finish
+from fmqm_addon.metric.surface import Surface, is_closed
 
 from .meshes import TETRAHEDRON, cube, grid, icosahedron, sphere, surface
 from .oracles import NaiveQuery, winding_number

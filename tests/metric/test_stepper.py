@@ -3,12 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
-
-from fmqm_addon.metric.stepper import Progress, Stepper, as_part
+from fmqm_addon.metric.stepper import Progress, Stepper, Work, as_part
 
 
-def counting() -> Generator[Progress, None, int]:
+def counting() -> Work[int]:
     yield Progress("half", 0.5)
     return 7
 
@@ -28,13 +26,13 @@ def test_a_result_stays() -> None:
     assert stepper.result == 7
 
 
-def sharing() -> Generator[float, None, str]:
-    yield 0.5
+def sharing() -> Work[str]:
+    yield Progress("", 0.5)
     return "done"
 
 
 def test_all_that_yields_progress_can_be_a_part() -> None:
-    """A stepper, a generator of its progress, and one that only tells its share."""
+    """A stepper, a generator of its progress, and one whose only stage has no name."""
     for part, stage, result in ((counting(), "half", 7), (Stepper(counting()), "half", 7), (sharing(), "", "done")):
         stepper = Stepper(as_part(part, 0.25, 0.5))
         assert stepper.step() and stepper.progress == Progress(stage, 0.5)

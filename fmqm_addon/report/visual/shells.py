@@ -10,7 +10,8 @@ import numpy as np
 from ...metric.fields import Fields, evaluate_fields
 from ...metric.geometry import Floats, Ints, morton_order
 from ...metric.sampling import draw_barycentric, triangles_evenly
-from ...metric.surface import Surface, finish, triangle_areas, triangle_normals
+from ...metric.stepper import finish
+from ...metric.surface import Surface, triangle_areas, triangle_normals
 
 SHELLS = 5  # as in the supplement's figure
 

@@ -37,8 +37,8 @@ from fmqm_addon.comparison.decimation import (
 )
 from fmqm_addon.metric.errors import FMQMError, MeshError, SettingsError
 from fmqm_addon.metric.settings import Settings
-from fmqm_addon.metric.stepper import Progress
-from fmqm_addon.metric.surface import MeshArrays, finish
+from fmqm_addon.metric.stepper import Progress, Work, finish
+from fmqm_addon.metric.surface import MeshArrays
 from fmqm_addon.ui.operators import decimate as ui_decimate
 from tests.blender import scenes
 from tests.blender.script import SCORE, noise, read_json, score, strict_json, write_png, write_torus
@@ -68,7 +68,7 @@ def decimate(*arguments: object, cwd: Path | None = None) -> Any:
 def test_the_last_that_passes_is_found_from_anywhere(passing: int, start: int, stride: int) -> None:
     asked = []
 
-    def passes(index: int) -> Generator[Progress, None, bool]:
+    def passes(index: int) -> Work[bool]:
         asked.append(index)
         yield Progress("", 0.0)
         return index < passing

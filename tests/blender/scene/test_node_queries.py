@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,8 @@ from fmqm_addon.metric.fields import Fields, evaluate_fields
 from fmqm_addon.metric.geometry import Floats, Ints, morton_order
 from fmqm_addon.metric.queries import BatchQuery
 from fmqm_addon.metric.settings import Settings
-from fmqm_addon.metric.surface import MeshArrays, Surface, finish, prepare_surface
+from fmqm_addon.metric.stepper import Work, finish
+from fmqm_addon.metric.surface import MeshArrays, Surface, prepare_surface
 from fmqm_addon.metric.texture import Material, PlainColor
 
 from .. import scenes
@@ -98,7 +99,7 @@ def test_real_models_score_as_with_a_ray_for_each_sample(shared_data: Path, mode
     assert again.dist.ncf.tobytes() == nodes.dist.ncf.tobytes()
 
 
-def begun(shape: Surface, steps: int) -> Generator[float, None, Fields]:
+def begun(shape: Surface, steps: int) -> Work[Fields]:
     """The fields of a surface, some steps in."""
     points = near(30_000)
     work = evaluate_fields(shape, points, morton_order(points))
