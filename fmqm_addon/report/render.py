@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Pictures of what was compared, drawn by casting camera rays through the surfaces' own spatial queries.
 
-A pixel's color comes from the same lookup as the color field (NCF), times a headlight's shade. No
-renderer and no graphics card take part.
+A pixel's color comes from the same lookup as the color field (NCF), times a headlight's shade by smooth normals, as
+games show meshes. No renderer and no graphics card take part.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..comparison.normals import corner_normals
 from ..metric.errors import FMQMError
 from ..metric.evaluation import Result
 from ..metric.geometry import Floats, Ints, closest_on_triangles, dot
@@ -128,6 +129,7 @@ def render(
     size: tuple[int, int],
     face_color: Floats | None = None,
     hits: Ints | None = None,
+    normals: Floats | None = None,
 ) -> Pixels:
     """A surface as the camera sees it, from either side of its faces, on BACKGROUND.
 
@@ -135,18 +137,21 @@ def render(
         size: width and height in pixels.
         face_color: (T, 3) encoded colors in [0, 1] to show in place of the surface's own.
         hits: what pixel_hits() says of the same surface, camera and size, to save casting them again.
+        normals: what corner_normals() says of the surface, to save smoothing them again.
 
     Returns:
         (height, width, 3) uint8. One ray a pixel, and more where neighbors differ.
     """
     if hits is None:
         hits = pixel_hits(surface, camera, size)
+    if normals is None:
+        normals = corner_normals(surface)
     columns, rows = _pixel_centers(size)
-    image = _ray_colors(surface, camera, _directions(camera, size, columns, rows), hits, face_color)
+    image = _ray_colors(surface, camera, _directions(camera, size, columns, rows), hits, normals, face_color)
     rough = np.flatnonzero(_differs(image.reshape(size[1], size[0], 3)))
     across, down = MORE_RAYS.T
     directions = _directions(camera, size, (columns[rough, None] + across).ravel(), (rows[rough, None] + down).ravel())
-    fine = _ray_colors(surface, camera, directions, _first_hits(surface, camera, directions), face_color)
+    fine = _ray_colors(surface, camera, directions, _first_hits(surface, camera, directions), normals, face_color)
     image[rough] = fine.reshape(len(rough), len(MORE_RAYS), 3).mean(axis=1)
     pixels: Pixels = (image.reshape(size[1], size[0], 3) * 255 + 0.5).astype(np.uint8)
     return pixels
@@ -187,7 +192,7 @@ def is_seen(surface: Surface, camera: Camera, point: Floats) -> bool:
 
 
 def _ray_colors(
-    surface: Surface, camera: Camera, directions: Floats, triangle: Ints, face_color: Floats | None
+    surface: Surface, camera: Camera, directions: Floats, triangle: Ints, normals: Floats, face_color: Floats | None
 ) -> Floats:
     """(N, 3) encoded colors in [0, 1] of rays from the camera that end on the (N,) triangles; -1: BACKGROUND."""
     colors = np.empty((len(directions), 3))
@@ -195,17 +200,21 @@ def _ray_colors(
     hit = np.flatnonzero(triangle >= 0)
     directions, triangle = directions[hit], triangle[hit]
     a, b, c = (surface.vertices[surface.triangles[triangle, k]] for k in range(3))
-    normals = triangle_normals(surface.vertices, surface.triangles[triangle])
-    slope = dot(normals, directions)
-    normals *= -np.sign(slope)[:, None]  # towards the camera
+    flat = triangle_normals(surface.vertices, surface.triangles[triangle])
+    slope = dot(flat, directions)
+    distance = dot(a - camera.eye, flat) / np.where(np.abs(slope) < 1e-12, 1e-12, slope)
+    barycentric = closest_on_triangles(camera.eye + distance[:, None] * directions, a, b, c)[1]
+    smooth = np.einsum("nk,nkc->nc", barycentric, normals[triangle])
+    # Towards the camera, whichever side of the face that is; normals that stand on the other side than the order of
+    # the corners say which side is meant.
+    smooth *= (-np.sign(slope) * np.where(dot(flat, smooth) < 0, -1, 1))[:, None]
     light = np.array(LIGHT) * (1, 1, -1) @ camera.axes
-    lit = np.maximum(normals @ (light / np.linalg.norm(light)), 0)
+    length = np.linalg.norm(light) * np.maximum(np.linalg.norm(smooth, axis=1), np.finfo(np.float64).tiny)
+    lit = np.maximum(smooth @ light / length, 0)
     if face_color is not None:
         seen, ambient = face_color[triangle], SCORE_AMBIENT
     else:
-        distance = np.abs(dot(a - camera.eye, normals)) / np.maximum(np.abs(slope), 1e-12)
-        points = camera.eye + distance[:, None] * directions
-        seen, ambient = surface.color_at(triangle, closest_on_triangles(points, a, b, c)[1]), AMBIENT
+        seen, ambient = surface.color_at(triangle, barycentric), AMBIENT
     colors[hit] = np.clip(seen, 0, 1) * (ambient + (1 - ambient) * lit)[:, None]
     return colors
 
@@ -249,11 +258,11 @@ def three_views(
     reference: Surface, distorted: Surface, face_scores: Floats, camera: Camera, size: tuple[int, int]
 ) -> tuple[Pixels, Pixels, Pixels]:
     """The reference, the distorted surface, and the reference colored by its (T,) face_scores; as render()."""
-    hits = pixel_hits(reference, camera, size)
+    hits, normals = pixel_hits(reference, camera, size), corner_normals(reference)
     return (
-        render(reference, camera, size, hits=hits),
+        render(reference, camera, size, hits=hits, normals=normals),
         render(distorted, camera, size),
-        render(reference, camera, size, score_colors(face_scores), hits),
+        render(reference, camera, size, score_colors(face_scores), hits, normals),
     )
 
 

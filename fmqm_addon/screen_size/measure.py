@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..comparison.normals import corner_normals
 from ..metric.colorspace import encode_srgb
 from ..metric.errors import SettingsError
 from ..metric.geometry import Floats, Ints
@@ -21,6 +22,7 @@ from .definition import (
     PIXELS_PER_DEGREE,
     RENDER,
     SIZES,
+    SMOOTH_ANGLE,
     STRICT,
     VIEW_CHOICES,
     VIEWS,
@@ -28,7 +30,6 @@ from .definition import (
 )
 from .flip import Appearance, appearance, flip_map
 from .mipmaps import Mipmaps
-from .normals import corner_normals
 from .render import View, render
 from .ssim import Structure, ssim_map, structure
 from .views import camera_axes, fibonacci_directions
@@ -202,7 +203,7 @@ class _Model:
 
     def __init__(self, surface: Surface) -> None:
         self.surface = surface
-        self._normals = corner_normals(surface)
+        self._normals = corner_normals(surface, SMOOTH_ANGLE)
         self._mipmaps = Mipmaps()
         self._scaled: dict[int, Surface] = {}
         self._views: dict[tuple[int, int], View] = {}

@@ -15,13 +15,14 @@ from fmqm_addon.metric.errors import FileError, FMQMError
 from fmqm_addon.metric.evaluation import COLUMNS, Evaluation, Result
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.surface import Frame, MeshArrays, Surface, prepare_surface
-from fmqm_addon.metric.texture import Material, Texture
+from fmqm_addon.metric.texture import Material, PlainColor, Texture
 from fmqm_addon.report import render as rendering
 from fmqm_addon.report import sheet
 from fmqm_addon.report.labels import shorten
 from fmqm_addon.report.render import Camera, render, score_by_face
 from fmqm_addon.report.sheet import write_picture
 from fmqm_addon.report.visual.colormap import NO_PATCH, score_colors
+from tests.metric.meshes import cube, sphere, surface
 
 RED, GREEN, BLUE, YELLOW = (200, 20, 20), (20, 200, 20), (20, 20, 200), (200, 200, 20)
 FRONT = {"azimuth": 0.0, "elevation": 0.0}
@@ -76,6 +77,13 @@ def test_both_sides_of_a_face_are_drawn() -> None:
     surface = wall(2)
     image = render(surface, Camera.framing(surface, azimuth=180.0, elevation=0.0), (40, 40))
     assert hue(image[10, 30]) == pytest.approx(hue(np.array(RED)), abs=0.03)  # left and right change places
+
+
+def test_curved_surfaces_are_shaded_smoothly_and_edges_stay_sharp() -> None:
+    ball, box = (surface(shape, (PlainColor((1, 1, 1)),)) for shape in (sphere(), cube()))
+    for each, low, high in ((ball, 1, 8), (box, 50, 255)):
+        image = render(each, Camera.framing(each), (120, 120)).astype(int)
+        assert low <= np.abs(np.diff(image[30:90, 30:90].max(axis=2), axis=1)).max() < high
 
 
 def test_camera_holds_every_vertex_and_wastes_nothing() -> None:

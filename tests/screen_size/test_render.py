@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fmqm_addon.comparison.normals import corner_normals, smoothed_normals
 from fmqm_addon.metric.texture import PlainColor, Texture
 from fmqm_addon.screen_size.definition import AMBIENT, BACKGROUND, HEADLIGHT, VIEW_CHOICES
 from fmqm_addon.screen_size.mipmaps import Mipmaps, halved
-from fmqm_addon.screen_size.normals import corner_normals, smoothed_normals
 from fmqm_addon.screen_size.rasterize import rasterize
 from fmqm_addon.screen_size.render import image_side, render
 from fmqm_addon.screen_size.views import camera_axes, fibonacci_directions

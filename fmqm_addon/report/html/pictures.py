@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...comparison.judge import Judge
+from ...comparison.normals import corner_normals
 from ...metric.errors import FileError, OutputError
 from ...metric.evaluation import Result
 from ...metric.surface import Surface
@@ -118,14 +119,18 @@ def _close_ups(
     overview: Camera,
 ) -> list[dict[str, Any]]:
     found = []
+    pair = {"reference": reference, "distorted": distorted}
+    surfaces = {name: (surface, corner_normals(surface)) for name, surface in pair.items()}
     for number, worst in enumerate(worst_patches(result, CLOSE_UPS, judge), 1):
         if worst.score == 1:  # nothing to see here, nor in those that follow
             break
         center, diagonal, normal = patch_view(result, worst.patch)
         camera = Camera.facing(center, normal, CLOSE_UP_MARGIN * diagonal)
         pictures = {
-            name: _write(folder, f"{stem}-worst{number}-{name}", render(surface, camera, (CLOSE_UP, CLOSE_UP)))
-            for name, surface in (("reference", reference), ("distorted", distorted))
+            name: _write(
+                folder, f"{stem}-worst{number}-{name}", render(surface, camera, (CLOSE_UP, CLOSE_UP), normals=normals)
+            )
+            for name, (surface, normals) in surfaces.items()
         }
         seed = result.patch_centers[worst.patch]
         found.append(

@@ -7,22 +7,27 @@ import numpy as np
 
 from ..metric.geometry import Floats, Ints, cross, dot
 from ..metric.surface import Surface, triangle_normals
-from .definition import SMOOTH_ANGLE
+
+SMOOTH_ANGLE = 60.0  # degrees; where a mesh has no normals, they are smoothed over edges that are less sharp
 
 
-def corner_normals(surface: Surface) -> Floats:
-    """(T, 3, 3) float64 unit normals: the surface's own; smoothed at corners where it has none."""
+def corner_normals(surface: Surface, smooth_angle: float = SMOOTH_ANGLE) -> Floats:
+    """(T, 3, 3) float64 unit normals: the surface's own; smoothed at corners where it has none.
+
+    Args:
+        smooth_angle: degrees; edges that are at least as sharp stay so.
+    """
     given = surface.normals
     if given is None:
-        return smoothed_normals(surface)
+        return smoothed_normals(surface, smooth_angle)
     length = np.linalg.norm(given, axis=2, keepdims=True)
     known = np.isfinite(length) & (length > 0)
     if known.all():
         return given / length
-    return np.where(known, given / np.where(known, length, 1), smoothed_normals(surface))
+    return np.where(known, given / np.where(known, length, 1), smoothed_normals(surface, smooth_angle))
 
 
-def smoothed_normals(surface: Surface) -> Floats:
+def smoothed_normals(surface: Surface, smooth_angle: float = SMOOTH_ANGLE) -> Floats:
     """(T, 3, 3) float64 unit normals: at each corner, the mean of the faces around it up to the next sharp edges.
 
     Faces count by their area: what a decimated mesh shows of a shape lies in its large faces.
@@ -30,15 +35,16 @@ def smoothed_normals(surface: Surface) -> Floats:
     corners = surface.vertices[surface.triangles]
     weighted = np.repeat(cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), 3, axis=0)
     flat = triangle_normals(surface.vertices, surface.triangles)
-    fan = _fans(surface, flat)
+    fan = _fans(surface, flat, float(np.cos(np.radians(smooth_angle))))
     total = np.stack([np.bincount(fan, column, len(fan)) for column in weighted.T], axis=1)[fan]
     length = np.linalg.norm(total, axis=1, keepdims=True)
     smooth = np.where(length > 0, total / np.where(length > 0, length, 1), np.repeat(flat, 3, axis=0))
     return smooth.reshape(-1, 3, 3)
 
 
-def _fans(surface: Surface, flat: Floats) -> Ints:
-    """(3 T,) a number for each corner, the same for those at one vertex that edges join which are not sharp."""
+def _fans(surface: Surface, flat: Floats, sharp: float) -> Ints:
+    """(3 T,) a number for each corner, the same for those at one vertex that edges join which are not sharp:
+    whose faces' normals have at least this cosine."""
     corner = np.arange(3 * len(flat)).reshape(-1, 3)
     # Each edge of each triangle, with the corners at its two ends: at the lower vertex first.
     starts, ends = surface.triangles.ravel(), np.roll(surface.triangles, -1, axis=1).ravel()
@@ -48,7 +54,7 @@ def _fans(surface: Surface, flat: Floats) -> Ints:
     order = np.argsort(low * len(surface.vertices) + high, kind="stable")
     one, other = order[:-1], order[1:]
     joined = (low[one] == low[other]) & (high[one] == high[other])
-    joined &= dot(flat[one // 3], flat[other // 3]) >= np.cos(np.radians(SMOOTH_ANGLE))
+    joined &= dot(flat[one // 3], flat[other // 3]) >= sharp
     one, other = one[joined], other[joined]
     first, second = np.concatenate([at_low[one], at_high[one]]), np.concatenate([at_low[other], at_high[other]])
     fan = np.arange(3 * len(flat))
