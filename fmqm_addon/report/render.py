@@ -7,6 +7,7 @@ games show meshes. No renderer and no graphics card take part.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ from ..comparison.normals import corner_normals
 from ..metric.errors import FMQMError
 from ..metric.evaluation import Result
 from ..metric.geometry import Floats, Ints, closest_on_triangles, dot
+from ..metric.stepper import Progress, Work, as_part, finish
 from ..metric.surface import Surface, triangle_normals
 from .visual.axes import plane_axes
 from .visual.colormap import score_colors
@@ -34,7 +36,7 @@ AMBIENT, SCORE_AMBIENT = 0.5, 0.65  # shade of a face edge-on; colors that mean 
 LIGHT = (-0.45, 0.55, 1.0)  # direction to the headlight: right, up, towards the camera
 CONTRAST = 0.16  # pixels that differ this much from a neighbor get more rays
 MORE_RAYS = np.array([(-1, -3), (3, -1), (1, 3), (-3, 1)]) / 8  # a turned square: no two in a row or column
-BATCH = 1 << 16  # rays per query
+BATCH = 1 << 13  # rays of a step
 HIDDEN_BEHIND = 0.01  # of the frame: what lies this much deeper than what is seen is hidden
 
 
@@ -142,16 +144,27 @@ def render(
     Returns:
         (height, width, 3) uint8. One ray a pixel, and more where neighbors differ.
     """
-    if hits is None:
-        hits = pixel_hits(surface, camera, size)
+    return finish(rendering(surface, camera, size, face_color, hits, normals))
+
+
+def rendering(
+    surface: Surface,
+    camera: Camera,
+    size: tuple[int, int],
+    face_color: Floats | None = None,
+    hits: Ints | None = None,
+    normals: Floats | None = None,
+) -> Work[Pixels]:
+    """render() in steps of some milliseconds, but for smoothing normals that are not given."""
     if normals is None:
         normals = corner_normals(surface)
     columns, rows = _pixel_centers(size)
-    image = _ray_colors(surface, camera, _directions(camera, size, columns, rows), hits, normals, face_color)
+    casting = _casting(surface, camera, size, columns, rows, normals, face_color, hits)
+    image = yield from as_part(casting, 0.0, 0.6)
     rough = np.flatnonzero(_differs(image.reshape(size[1], size[0], 3)))
     across, down = MORE_RAYS.T
-    directions = _directions(camera, size, (columns[rough, None] + across).ravel(), (rows[rough, None] + down).ravel())
-    fine = _ray_colors(surface, camera, directions, _first_hits(surface, camera, directions), normals, face_color)
+    columns, rows = (columns[rough, None] + across).ravel(), (rows[rough, None] + down).ravel()
+    fine = yield from as_part(_casting(surface, camera, size, columns, rows, normals, face_color), 0.6, 0.4)
     image[rough] = fine.reshape(len(rough), len(MORE_RAYS), 3).mean(axis=1)
     pixels: Pixels = (image.reshape(size[1], size[0], 3) * 255 + 0.5).astype(np.uint8)
     return pixels
@@ -159,7 +172,17 @@ def render(
 
 def pixel_hits(surface: Surface, camera: Camera, size: tuple[int, int]) -> Ints:
     """(height * width,) the triangle behind the center of each pixel, row after row; -1 for none."""
-    return _first_hits(surface, camera, _directions(camera, size, *_pixel_centers(size)))
+    return finish(hitting_pixels(surface, camera, size))
+
+
+def hitting_pixels(surface: Surface, camera: Camera, size: tuple[int, int]) -> Work[Ints]:
+    """pixel_hits() in steps of some milliseconds."""
+    columns, rows = _pixel_centers(size)
+    hits = np.empty(len(columns), np.int64)
+    for here in _batches(len(hits)):
+        hits[here] = _first_hits(surface, camera, _directions(camera, size, columns[here], rows[here]))
+        yield Progress("", here.stop / len(hits))
+    return hits
 
 
 def _pixel_centers(size: tuple[int, int]) -> tuple[Floats, Floats]:
@@ -173,14 +196,15 @@ def _directions(camera: Camera, size: tuple[int, int], columns: Floats, rows: Fl
     return camera.directions(2 * columns / size[0] - 1, 1 - 2 * rows / size[1])
 
 
+def _batches(count: int) -> Iterator[slice]:
+    """So many rays, as many as are asked for at once: a query makes Python objects of them."""
+    for first in range(0, count, BATCH):
+        yield slice(first, min(first + BATCH, count))
+
+
 def _first_hits(surface: Surface, camera: Camera, directions: Floats) -> Ints:
     """(N,) the first triangle on each ray from the camera, -1 for none."""
-    triangle = np.empty(len(directions), np.int64)
-    for first in range(0, len(directions), BATCH):  # a query makes Python objects of its rays
-        here = slice(first, first + BATCH)
-        origins = camera.eye + camera.near * directions[here]
-        triangle[here] = surface.query.first_hit(origins, directions[here])[0]
-    return triangle
+    return surface.query.first_hit(camera.eye + camera.near * directions, directions)[0]
 
 
 def is_seen(surface: Surface, camera: Camera, point: Floats) -> bool:
@@ -189,6 +213,26 @@ def is_seen(surface: Surface, camera: Camera, point: Floats) -> bool:
     distance = float(np.linalg.norm(towards))
     _, hit = surface.query.first_hit(camera.eye[None], (towards / distance)[None])
     return bool(hit[0] > distance - HIDDEN_BEHIND)
+
+
+def _casting(
+    surface: Surface,
+    camera: Camera,
+    size: tuple[int, int],
+    columns: Floats,
+    rows: Floats,
+    normals: Floats,
+    face_color: Floats | None,
+    hits: Ints | None = None,
+) -> Work[Floats]:
+    """(N, 3) encoded colors in [0, 1] of rays through places of the image, in pixels. hits: as in render()."""
+    colors = np.empty((len(columns), 3))
+    for here in _batches(len(colors)):
+        directions = _directions(camera, size, columns[here], rows[here])
+        triangle = _first_hits(surface, camera, directions) if hits is None else hits[here]
+        colors[here] = _ray_colors(surface, camera, directions, triangle, normals, face_color)
+        yield Progress("", here.stop / len(colors))
+    return colors
 
 
 def _ray_colors(
