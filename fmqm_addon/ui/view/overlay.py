@@ -10,7 +10,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-import blf
 import bpy
 import gpu
 import numpy as np
@@ -23,17 +22,14 @@ from .. import session
 from ..properties.rows import active_row
 from ..stored_text import read_legend
 from . import heat, shells
+from .ink import Ink, box, draw_shape, free_corner
 from .legends import LEGEND
 
-_FONT = 0
-_MARGIN, _PAD, _LINE, _GAP = 14, 10, 17, 8  # pixels at a UI scale of 1
+_PAD, _LINE, _GAP = 10, 17, 8  # pixels at a UI scale of 1
 _BAR_WIDTH, _BAR_HEIGHT, _TICK = 14, 150, 4
 _COUNTS = 46  # of the histogram beside the bar
 _PANEL = 128  # side of one of the figure's four pictures
 _DOT = 2.6
-_OPACITY = 0.9
-
-Color = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
@@ -118,8 +114,8 @@ def _draw_legends() -> None:
         on_draw()
     if not bpy.context.space_data.overlay.show_overlays:
         return
-    ink = _Ink()
-    x, y = _corner(ink)
+    ink = Ink()
+    x, y = free_corner(ink)
     bars.pop(bpy.context.area.as_pointer(), None)
     for legend in legends():
         x += _draw_legend(ink, legend, x, y) + ink.px(_GAP)
@@ -137,48 +133,7 @@ def belongs_here(shown: UnitFigure) -> bool:
     return here and session.get(shown.uid) is not None
 
 
-class _Ink:
-    """Type, colors and lengths of this user's interface."""
-
-    def __init__(self) -> None:
-        preferences = bpy.context.preferences
-        self._scale = preferences.system.ui_scale
-        widget = preferences.themes[0].user_interface.wcol_tooltip
-        self.back: Color = (*widget.inner[:3], _OPACITY)
-        self.text: Color = (*widget.text[:3], 1.0)
-        self.faint: Color = (*widget.text[:3], 0.7)
-        self.points = preferences.ui_styles[0].widget.points * self._scale
-
-    def px(self, length: float) -> float:
-        return round(length * self._scale)
-
-    def width(self, text: str) -> float:
-        blf.size(_FONT, self.points)
-        return float(blf.dimensions(_FONT, text)[0])
-
-    def write(self, text: str, x: float, y: float, color: Color | None = None) -> None:
-        """Text with its baseline's left end at a place."""
-        blf.size(_FONT, self.points)
-        blf.color(_FONT, *(color or self.text))
-        blf.position(_FONT, x, y, 0)
-        blf.draw(_FONT, text)
-
-
-def _corner(ink: _Ink) -> tuple[float, float]:
-    """The lower left corner of what no toolbar or header covers, and a margin."""
-    window = bpy.context.region
-    left, bottom = 0, 0
-    for region in bpy.context.area.regions:
-        if region.width <= 1 or region.height <= 1 or region == window:
-            continue
-        if region.type == "TOOLS" and region.alignment == "LEFT":
-            left = max(left, region.x + region.width - window.x)
-        elif region.type == "HUD" or (region.alignment == "BOTTOM" and region.y <= window.y + 1):
-            bottom = max(bottom, region.y + region.height - window.y)
-    return left + ink.px(_MARGIN), bottom + ink.px(_MARGIN)
-
-
-def _draw_legend(ink: _Ink, legend: dict[str, Any], x: float, y: float) -> float:
+def _draw_legend(ink: Ink, legend: dict[str, Any], x: float, y: float) -> float:
     """One legend with its lower left corner at a place; its width."""
     px, pad, line = ink.px, ink.px(_PAD), ink.px(_LINE)
     bar, swatches = legend["bar"], legend["swatches"]
@@ -195,7 +150,7 @@ def _draw_legend(ink: _Ink, legend: dict[str, Any], x: float, y: float) -> float
     )
     body = px(_BAR_HEIGHT) + line if bar else line * len(swatches)
     height = 2 * line + body + (line if legend["note"] else 0) + 2 * pad
-    _box(x, y, width + 2 * pad, height, ink.back)
+    box(x, y, width + 2 * pad, height, ink.back)
 
     left, top = x + pad, y + height - pad
     ink.write(legend["title"], left, top - px(12))
@@ -208,7 +163,7 @@ def _draw_legend(ink: _Ink, legend: dict[str, Any], x: float, y: float) -> float
             bars[bpy.context.area.as_pointer()] = (*place, px(_BAR_WIDTH), px(_BAR_HEIGHT))
         _draw_bar(ink, legend, *place)
     for color, text in swatches:
-        _box(left, top - px(13), px(_BAR_WIDTH), px(11), (*color, 1.0))
+        box(left, top - px(13), px(_BAR_WIDTH), px(11), (*color, 1.0))
         ink.write(text, left + px(_BAR_WIDTH + 6), top - px(12))
         top -= line
     if legend["note"]:
@@ -216,26 +171,26 @@ def _draw_legend(ink: _Ink, legend: dict[str, Any], x: float, y: float) -> float
     return float(width + 2 * pad)
 
 
-def _draw_counts(ink: _Ink, counts: list[float], x: float, y: float) -> None:
+def _draw_counts(ink: Ink, counts: list[float], x: float, y: float) -> None:
     """How many patches have each value, as bars to the left of the color bar, whose lower left corner is given."""
     step = ink.px(_BAR_HEIGHT) / len(counts)
     for number, count in enumerate(counts):
         length = count * ink.px(_COUNTS - 4)
-        _box(x - ink.px(2) - length, y + number * step, length, max(step - 1, 1), ink.faint)
+        box(x - ink.px(2) - length, y + number * step, length, max(step - 1, 1), ink.faint)
 
 
-def _draw_hint(ink: _Ink, shown: Hint) -> None:
+def _draw_hint(ink: Ink, shown: Hint) -> None:
     pad, line = ink.px(_PAD), ink.px(_LINE)
     width, height = max(map(ink.width, shown.lines)) + 2 * pad, len(shown.lines) * line + 2 * pad
     region = bpy.context.region
     x = min(shown.at[0] + ink.px(16), region.width - width)
     y = min(max(shown.at[1] - height, 0), region.height - height)
-    _box(x, y, width, height, ink.back)
+    box(x, y, width, height, ink.back)
     for number, text in enumerate(shown.lines):
         ink.write(text, x + pad, y + height - pad - line * number - ink.px(12), None if number < 2 else ink.faint)
 
 
-def _draw_bar(ink: _Ink, legend: dict[str, Any], x: float, y: float) -> None:
+def _draw_bar(ink: Ink, legend: dict[str, Any], x: float, y: float) -> None:
     """The color bar upwards from a place, its numbers, and the mark at the whole score."""
     px = ink.px
     width, height = px(_BAR_WIDTH), px(_BAR_HEIGHT)
@@ -243,25 +198,25 @@ def _draw_bar(ink: _Ink, legend: dict[str, Any], x: float, y: float) -> None:
     rows = np.linspace(y, y + height, len(colors)).tolist()
     positions = [(at, row) for row in rows for at in (x, x + width)]
     strip_colors = [color for color in colors for _ in (0, 1)]
-    _draw("TRI_STRIP", positions, strip_colors)
+    draw_shape("TRI_STRIP", positions, strip_colors)
     half = px(4)
     for place, text in legend["ticks"]:
         at = y + place * height
-        _box(x + width, at, px(_TICK), max(px(1), 1), ink.faint)
+        box(x + width, at, px(_TICK), max(px(1), 1), ink.faint)
         ink.write(text, x + width + px(_TICK + 5), at - half)
     if legend["mark"]:
         place, text = legend["mark"]
         at, tip = y + place * height, x + width + px(_TICK + 10) + ink.width("0.0000")
         corners = [(tip, at), (tip + px(7), at + px(5)), (tip + px(7), at - px(5))]
-        _draw("TRIS", corners, [ink.text] * 3)
+        draw_shape("TRIS", corners, [ink.text] * 3)
         ink.write(text, tip + px(12), at - half)
 
 
-def _draw_figure(ink: _Ink, shown: UnitFigure, x: float, y: float) -> None:
+def _draw_figure(ink: Ink, shown: UnitFigure, x: float, y: float) -> None:
     px, pad, line, side = ink.px, ink.px(_PAD), ink.px(_LINE), ink.px(_PANEL)
     label = max(ink.width("Normal"), ink.width("Tangent")) + pad
     width, height = label + 2 * side + 3 * pad, 2 * side + 2 * line + 3 * pad
-    _box(x, y, width, height, ink.back)
+    box(x, y, width, height, ink.back)
     ink.write(shown.title, x + pad, y + height - pad - px(12))
     for column, text in enumerate(("Original", "LOD")):
         ink.write(text, x + pad + label + column * (side + pad), y + height - pad - px(12) - line, ink.faint)
@@ -323,17 +278,4 @@ def _draw_marks() -> None:
         shader.uniform_float("lineWidth", width * bpy.context.preferences.system.ui_scale)
         shader.uniform_float("color", color)
         batch_for_shader(shader, "LINES", {"pos": points}).draw(shader)
-    gpu.state.blend_set("NONE")
-
-
-def _box(x: float, y: float, width: float, height: float, color: Color) -> None:
-    corners = [(x, y), (x + width, y), (x, y + height), (x + width, y + height)]
-    _draw("TRI_STRIP", corners, [color] * 4)
-
-
-def _draw(kind: str, positions: list[tuple[float, float]], colors: list[Color]) -> None:
-    shader = gpu.shader.from_builtin("SMOOTH_COLOR")
-    gpu.state.blend_set("ALPHA")
-    flat = [(x, y, 0.0) for x, y in positions]
-    batch_for_shader(shader, kind, {"pos": flat, "color": colors}).draw(shader)
     gpu.state.blend_set("NONE")
