@@ -18,11 +18,11 @@ from ...metric.errors import FileError, FMQMError, MeshError, SettingsError
 from ...metric.surface import MeshArrays
 from ..materials.types import Reading
 from ..scene.decimate import add_modifiers, scene_reader
-from ..scene.members import instanced
+from ..scene.members import instanced, lineage
 from ..scene.mesh_arrays import AS_FOUND
 from ..scene.parts import parts_of
 from .asset_path import split_spec
-from .flatten import ancestors, flatten_objects
+from .flatten import flatten_objects
 from .load import last_line, load_mesh, named, open_file
 from .loaded import mute_imports
 
@@ -244,11 +244,10 @@ def _refuse_input(path: str, place: str, inputs: Sequence[str], error: type[FMQM
 
 def _moves(object_: bpy.types.Object) -> bool:
     """Whether there is more to an object than its pose."""
-    line = [object_, *ancestors(object_)]
     return (
         getattr(object_.data, "shape_keys", None) is not None
         or any(modifier.type == "ARMATURE" for modifier in object_.modifiers)
-        or any(each.type == "ARMATURE" or each.animation_data is not None for each in line)
+        or any(each.type == "ARMATURE" or each.animation_data is not None for each in lineage(object_))
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ..scene.evaluated import Evaluated, Shown, evaluated, shown
+from ..scene.members import lineage
 from ..scene.mesh_arrays import slot_materials
 
 _KEPT = ("EMPTY", "LIGHT", "CAMERA")  # beside what is measured
@@ -54,23 +55,14 @@ def flatten_objects(objects: Sequence[bpy.types.Object], alone: bool) -> list[bp
     kept = {object_.name_full: object_ for object_ in objects}
     if not alone:
         kept |= {each.name_full: each for each in bpy.context.scene.objects if each.type in _KEPT}
-        kept |= {above.name_full: above for each in list(kept.values()) for above in ancestors(each)}
-    nodes = _nodes(sorted(kept.values(), key=lambda each: len(ancestors(each))), set(objects))
+        kept |= {above.name_full: above for each in list(kept.values()) for above in lineage(each)}
+    nodes = _nodes(sorted(kept.values(), key=lambda each: len(lineage(each))), set(objects))
     bpy.data.batch_remove(list(bpy.data.objects))
     made: list[tuple[bpy.types.Object, Matrix]] = []
     for node in nodes:
         made.append(_made(node, None if node.parent is None else made[node.parent]))
     bpy.context.view_layer.update()
     return [object_ for object_, _ in made]
-
-
-def ancestors(object_: bpy.types.Object) -> list[bpy.types.Object]:
-    """An object's parent, the parent of that and so on."""
-    above = []
-    while object_.parent is not None:
-        object_ = object_.parent
-        above.append(object_)
-    return above
 
 
 def _nodes(kept: Sequence[bpy.types.Object], measured: set[bpy.types.Object]) -> list[_Node]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...metric.geometry import Floats
 from .lod_names import LODName, is_collider, lod_of_name, stem_of_name
-from .members import SURFACE_TYPES, instanced, is_measured, shows_surface
+from .members import SURFACE_TYPES, instanced, is_measured, lineage, shows_surface
 
 Asset: TypeAlias = bpy.types.Object | bpy.types.Collection
 
@@ -57,15 +57,6 @@ class Chain:
         else:
             found = (places[each.as_pointer()] for each in lineage(object_) if each.as_pointer() in places)
         return next(found, None)
-
-
-def lineage(object_: bpy.types.Object | None) -> list[bpy.types.Object]:
-    """An object and what it hangs from, the nearest first."""
-    found = []
-    while object_ is not None:
-        found.append(object_)
-        object_ = object_.parent
-    return found
 
 
 def lod_of(asset: Asset) -> LODName | None:

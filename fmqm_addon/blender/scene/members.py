@@ -35,6 +35,15 @@ def shows_surface(object_: bpy.types.Object) -> bool:
     return is_measured(object_) or any(map(is_measured, object_.children_recursive))
 
 
+def lineage(object_: bpy.types.Object | None) -> list[bpy.types.Object]:
+    """An object and what it hangs from, the nearest first."""
+    found = []
+    while object_ is not None:
+        found.append(object_)
+        object_ = object_.parent
+    return found
+
+
 def check_object(object_: bpy.types.Object) -> None:
     """Refuses what cannot be measured by its name.
 

@@ -12,8 +12,8 @@ import bpy
 from ...metric.errors import MeshError
 from ..materials.types import Reading
 from .lod_names import is_collider
-from .lods import COLLECTIONS, Chain, boxes_agree, chains_of, lineage
-from .members import check_object, collection_members, family_members, scene_members
+from .lods import COLLECTIONS, Chain, boxes_agree, chains_of
+from .members import check_object, collection_members, family_members, lineage, scene_members
 
 _NAMED = 3  # of many
 

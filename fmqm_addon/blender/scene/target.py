@@ -15,7 +15,7 @@ from ...metric.geometry import Floats
 from ..materials.images import TextureCache
 from ..materials.types import Reading
 from .evaluated import evaluated
-from .members import collection_members, family_members, instances_of, is_measured, shows_surface
+from .members import collection_members, family_members, instances_of, is_measured, lineage, shows_surface
 from .mesh_arrays import AS_FOUND, mesh_arrays, to_bake
 from .motion import pose_of
 from .parts import parts_of
@@ -119,7 +119,7 @@ def asset_mesh(
     if origin is None and len(objects) == 1:
         origin = objects[0]
     elif origin is None:
-        roots = {_root(object_).name_full: _root(object_) for object_ in objects}
+        roots = {root.name_full: root for root in (lineage(object_)[-1] for object_ in objects)}
         origin = next(iter(roots.values())) if len(roots) == 1 else None
     matrix = np.eye(4) if origin is None else _matrix_of(origin)
     check_shaping_images(objects)
@@ -160,12 +160,6 @@ def _without_modifiers(
         raise MeshError(str(error).replace(duplicate.name, object_.name)) from error
     finally:
         bpy.data.objects.remove(duplicate)
-
-
-def _root(object_: bpy.types.Object) -> bpy.types.Object:
-    while object_.parent is not None:
-        object_ = object_.parent
-    return object_
 
 
 def _matrix_of(object_: bpy.types.Object) -> Floats:

@@ -8,7 +8,8 @@ from typing import ClassVar
 
 import bpy
 
-from ...blender.scene.lods import are_kin, find_lods, lineage
+from ...blender.scene.lods import are_kin, find_lods
+from ...blender.scene.members import lineage
 from ..properties.items import is_asset, item_target, kept
 from ..properties.scene import FMQMScene
 
