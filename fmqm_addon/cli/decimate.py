@@ -24,6 +24,7 @@ from ..blender.materials.types import Reading
 from ..comparison.judge import Judge
 from ..metric.errors import FMQMError, OutsideError, SettingsError, one_line
 from ..metric.settings import PRESETS, Settings
+from ..report.numbers import score_text
 from .arguments import OneLineParser, add_access, add_judge, add_option, check_access, settings_of
 from .process import FAILED, OK, prepare_bpy, run_script
 
@@ -189,7 +190,7 @@ def _output_names(output: str | None, chain: list[float]) -> list[str]:
 def _missed(outcome: TargetResult, judge: Judge, max_triangles: int | None, output: str | None) -> str:
     best, target = outcome.last.best, outcome.last.target
     score = best.score(judge)
-    reached = "nothing that could be measured" if score is None else f"{judge.column} {score:.4f}"
+    reached = "nothing that could be measured" if score is None else f"{judge.column} {score_text(score)}"
     kind, remedy = "", "ask for less"
     if max_triangles is not None and outcome.texture is None:
         remedy += ", or allow more"
@@ -226,7 +227,7 @@ def _table(result: DecimationResult, saved: Sequence[str | None]) -> str:
 
 def _cells(step: Step) -> tuple[str, ...]:
     texture = "-" if step.version.texture is None else str(step.version.texture)
-    scores = ("-" if score is None else f"{score:.4f}" for score in (step.fmqm, step.perceived))
+    scores = (score_text(score) for score in (step.fmqm, step.perceived))
     return f"{step.version.ratio:.4f}", str(step.triangles), texture, *scores
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..comparison.judge import Judge
+from .numbers import score_text
 from .records import value_of
 
 FIELDS = ("judge", "fail_under", "fail_under_p10")  # by what a record tells of it
@@ -68,5 +69,5 @@ def _missed(record: Mapping[str, Any]) -> list[tuple[str, float, float]]:
 
 
 def _short_of(value: float, least: float) -> str:
-    shown = f"{value:.4f}"
+    shown = score_text(value)
     return shown if float(shown) < least else repr(value)

@@ -9,6 +9,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from .criteria import below, judge_of, shortfall
+from .numbers import score_text
 from .records import BESIDE, PERCEIVED, SEPARATOR, SHOWN, value_of
 
 _NOT_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -48,7 +49,7 @@ def _case(record: Mapping[str, Any]) -> ElementTree.Element:
     if record["error"] is not None:
         ElementTree.SubElement(case, "error", message=_text(record["error"]))
     elif below(record):
-        features = ", ".join(f"{name} {value_of(record, name):.4f}" for name in judge_of(record).features)
+        features = ", ".join(f"{name} {score_text(value_of(record, name))}" for name in judge_of(record).features)
         ElementTree.SubElement(case, "failure", message=f"{shortfall(record)}: {features}")
     if record["warnings"]:
         ElementTree.SubElement(case, "system-out").text = _text("\n".join(record["warnings"]))

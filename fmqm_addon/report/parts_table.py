@@ -7,15 +7,15 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from ..metric.errors import one_line
+from .numbers import score_text
 
 HEADER = ("kind", "part", "triangles", "area", "FMQM", "perceived", "")
-_NONE = "-"
 _TEXTS = 2  # of the columns, which are aligned to the left
 
 
 def part_cells(part: Mapping[str, Any]) -> tuple[str, ...]:
     """What stands under HEADER for a part, as comparison.parts.Part.as_dict has it."""
-    fmqm, perceived = (_NONE if part[name] is None else f"{part[name]:.4f}" for name in ("FMQM", "perceived"))
+    fmqm, perceived = (score_text(part[name]) for name in ("FMQM", "perceived"))
     area = f"{100 * part['area']:.3g} %"
     gone = "gone" if part["missing"] else ""
     return (part["kind"], one_line(part["name"]), f"{part['triangles']:,}", area, fmqm, perceived, gone)

@@ -16,6 +16,7 @@ from ..comparison.measurement import Readings
 from ..metric.errors import one_line
 from ..metric.evaluation import COLUMNS, Scores
 from ..metric.perceived import Perceived
+from .numbers import MISSING, score_text
 from .trust_table import Report, trust_text
 
 SHOWN = ("FMQM", *(name for name in COLUMNS if name != "FMQM"))  # the score first, then its features
@@ -198,15 +199,12 @@ def value_of(record: Mapping[str, Any], column: str) -> float | None:
     return found
 
 
-def score_text(record: Mapping[str, Any], column: str, missing: str, plus_minus: str) -> str:
+def shown_score(record: Mapping[str, Any], column: str) -> str:
     """A number of a record as people read it, with its standard error where that is known."""
-    value = value_of(record, column)
-    if value is None:
-        return missing
     stderr, name = record["stderr"], column
     if column in PERCEIVED:
         stderr, name = record["perceived"]["stderr"], PERCEIVED[column]
-    return f"{value:.4f}" if stderr is None else f"{value:.4f}{plus_minus}{stderr[name]:.4f}"
+    return score_text(value_of(record, column), None if stderr is None else stderr[name])
 
 
 def _any_reverse(records: Iterable[Mapping[str, Any]]) -> bool:
@@ -219,14 +217,14 @@ def _any_size(records: Iterable[Mapping[str, Any]]) -> bool:
 
 def _cells(record: Mapping[str, Any], both: bool, sized: bool) -> tuple[str, ...]:
     reverse = record["reverse"]
-    turned = [f"{reverse['FMQM']:.4f}" if reverse else "-"] if both else []
+    turned = [score_text(reverse and reverse["FMQM"])] if both else []
     sizes = [size_text(record.get("screen_size"), kind) for kind in SIZES.values()] if sized else []
-    return (one_line(record["id"]), *(score_text(record, name, "-", " ±") for name in TABLE), *sizes, *turned)
+    return (one_line(record["id"]), *(shown_score(record, name) for name in TABLE), *sizes, *turned)
 
 
 def size_text(found: Mapping[str, Any] | None, kind: str) -> str:
     """A size on screen of a record, as people read it: strict or fade."""
-    return "-" if found is None else f"{found[kind]['bound']} {found[kind]['pixels']:.0f}".strip()
+    return MISSING if found is None else f"{found[kind]['bound']} {found[kind]['pixels']:.0f}".strip()
 
 
 def _csv_line(values: Iterable[str | float | None], raw: bool = False) -> str:

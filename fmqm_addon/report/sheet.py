@@ -16,6 +16,7 @@ from ..metric.geometry import Floats
 from ..metric.surface import Surface
 from .atomic_files import replaced
 from .labels import shorten
+from .numbers import score_text
 from .render import BACKGROUND, Camera, natural_aspect, require_pillow, score_by_face, three_views
 from .visual.colormap import NO_PATCH, score_colors
 
@@ -70,10 +71,10 @@ def compose(
         canvas.paste(Image.fromarray(view), (sheet.left(index), sheet.top))
     draw = ImageDraw.Draw(canvas)
     score = float(result.of_patches(judge.column).mean())
-    features = [f"{name} {result.of_patches(name).mean():.3f}" for name in judge.features]
+    features = [f"{name} {score_text(result.of_patches(name).mean(), places=3)}" for name in judge.features]
     sheet.label(draw, 0, "Reference", reference.name, f"{len(reference.triangles):,} triangles")
     sheet.label(draw, 1, "Distorted", distorted.name, f"{len(distorted.triangles):,} triangles")
-    sheet.label(draw, 2, f"{judge.column} {score:.4f}", "   ".join(features[:2]), "   ".join(features[2:]))
+    sheet.label(draw, 2, f"{judge.column} {score_text(score)}", "   ".join(features[:2]), "   ".join(features[2:]))
     sheet.color_bar(draw, judge.column, score, bool(np.isnan(faces).any()))
     return canvas
 

@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from ..comparison.surface_facts import Fact
 from ..comparison.trust import Trust
 from ..metric.errors import one_line
+from .numbers import value_text
 
 Report = dict[str, dict[str, dict[str, Any]]]  # group, fact, "value" and "unit"
 
@@ -107,21 +107,7 @@ def _text(item: dict[str, Any]) -> str:
     value = item["value"]
     if value is None:
         return _UNKNOWN
-    return _value_text(value, str(item["unit"]).startswith(SHARE))
-
-
-def _value_text(value: Any, is_share: bool) -> str:
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, float):
-        return f"{100 * value:.3g} %" if is_share else f"{value:.4g}"
-    if isinstance(value, int):
-        return f"{value:,}"
-    if isinstance(value, dict):
-        return ", ".join(f"{name} {_value_text(part, is_share)}" for name, part in value.items()) or "none"
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return ", ".join(_value_text(part, is_share) for part in value) or "none"
-    return str(value)
+    return value_text(value, str(item["unit"]).startswith(SHARE))
 
 
 def _image_text(image: dict[str, Any]) -> str:

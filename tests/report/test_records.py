@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names in the CSV come back as they are."""
+"""Names in the CSV come back as they are, and a score reads alike everywhere."""
 
 from __future__ import annotations
 
 import csv
 import io
 
-from fmqm_addon.report.records import PairScore, csv_text
+from fmqm_addon.report.numbers import score_text
+from fmqm_addon.report.records import PairScore, csv_text, pair_record, shown_score
 
 
 def test_names_with_breaks_come_back() -> None:
@@ -14,3 +15,10 @@ def test_names_with_breaks_come_back() -> None:
     text = csv_text([PairScore("r", name) for name in names])
     assert [row["id"] for row in csv.DictReader(io.StringIO(text, newline=""))] == names
     assert "\r" not in csv_text([PairScore("r", "d")])
+
+
+def test_a_score_reads_alike_wherever_it_stands() -> None:
+    assert score_text(0.71904) == "0.7190" and score_text(0.71904, places=2) == "0.72"
+    assert score_text(0.71904, 0.00312) == "0.7190 ± 0.0031" and score_text(None, 0.1) == "-"
+    scored = pair_record(PairScore("a", "b")) | {"FMQM": 0.71904, "stderr": {"FMQM": 0.00312}}
+    assert shown_score(scored, "FMQM") == "0.7190 ± 0.0031" and shown_score(scored, "perceived") == "-"

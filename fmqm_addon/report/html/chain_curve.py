@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from html import escape
 
 from ..labels import shorten
+from ..numbers import score_text
 
 WIDTH, HEIGHT = 460, 270
 LEFT, RIGHT, TOP, BOTTOM = 44, 16, 28, 62  # margins; the lowest level's name stands above the axis' numbers
@@ -50,7 +51,7 @@ def curve_svg(levels: Sequence[Level], cost: str, of: str) -> str:
     def y(score: float) -> float:
         return HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * (score - floor) / (1 - floor)
 
-    said = "; ".join(f"{level.name}: {_short(level.cost)} {cost}, {of} {level.score:.4f}" for level in ordered)
+    said = "; ".join(f"{level.name}: {_short(level.cost)} {cost}, {of} {score_text(level.score)}" for level in ordered)
     parts = [
         f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{of} against {escape(cost)}. {escape(said)}">'
     ]
@@ -72,7 +73,7 @@ def curve_svg(levels: Sequence[Level], cost: str, of: str) -> str:
         kind = ' class="reference"' if level.is_reference else ""
         parts.append(
             f'<circle{kind} cx="{x(level.cost):.1f}" cy="{y(level.score):.1f}" r="5">'
-            f"<title>{escape(level.name)}: {level.score:.4f}</title></circle>"
+            f"<title>{escape(level.name)}: {score_text(level.score)}</title></circle>"
         )
         name = shorten(level.name, lambda text: len(text) <= LABEL)
         at, height = x(level.cost) + shift, y(level.score) + drop

@@ -3,23 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from html import escape
-from typing import Any
 
 import numpy as np
 
 from ...metric.geometry import Floats
-from ..records import score_text
 from ..visual.colormap import score_colors
 
 MEGABYTE = 2**20
-MISSING = "–"
-
-
-def score(record: Mapping[str, Any], column: str) -> str:
-    """A number of a record, with its standard error where that is known."""
-    return score_text(record, column, MISSING, " ± ")
 
 
 def bar(value: float | None) -> str:

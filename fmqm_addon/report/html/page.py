@@ -19,9 +19,10 @@ from ...comparison.judge import Judge
 from ..atomic_files import write_parts
 from ..criteria import judge_of, shortfall
 from ..explain import footnote
-from ..records import TABLE, value_of
+from ..numbers import MISSING, score_text, value_text
+from ..records import TABLE, shown_score, value_of
 from .chain_curve import Level, curve_svg
-from .fragments import MEGABYTE, MISSING, bar, score, text
+from .fragments import MEGABYTE, bar, text
 from .pair_card import pair_card
 
 PAGE = "index.html"
@@ -152,7 +153,7 @@ def _summary(overview: _Overview) -> str:
     said = f"{_count(overview.pairs, 'pair')}, {_count(len(overview.chains), 'reference')}."
     lowest, name = overview.lowest
     if name:
-        said += f" Lowest {overview.judge.column}: {lowest:.4f}, {text(name)}."
+        said += f" Lowest {overview.judge.column}: {score_text(lowest)}, {text(name)}."
     if overview.scored < overview.pairs:
         said += f' <strong class="bad">{overview.pairs - overview.scored} not scored.</strong>'
     return said + " 1 is the same as the reference; compare scores only at equal settings."
@@ -167,7 +168,7 @@ def _row(number: int, record: Record, folder: str | None) -> str:
     name = _name(record, folder)
     cells = [f'<th scope="row" data-value="{escape(name)}"><a href="#pair-{number}">{text(name)}</a><br>{note}</th>']
     cells += [
-        _cell(value_of(record, column), score(record, column) + bar(value_of(record, column))) for column in TABLE
+        _cell(value_of(record, column), shown_score(record, column) + bar(value_of(record, column))) for column in TABLE
     ]
     pictures = record.get("pictures")
     triangles, size = (pictures["triangles"][1], pictures["texture_bytes"][1]) if pictures else (None, None)
@@ -206,17 +207,9 @@ def _curve(reference: str, chain: Sequence[_Cost], costs: Sequence[tuple[float, 
 
 
 def _value(value: Any) -> str:
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, float):
-        return f"{value:.4g}"
-    if isinstance(value, int):
-        return f"{value:,}"
     if isinstance(value, Mapping):
-        return "<br>".join(f"{text(name)}: {_value(part)}" for name, part in value.items()) or "none"
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return ", ".join(_value(part) for part in value) or "none"
-    return text("none" if value is None else value)
+        return "<br>".join(f"{text(name)}: {text(value_text(part))}" for name, part in value.items()) or "none"
+    return text(value_text(value))
 
 
 def _settings(settings: Mapping[str, Any], versions: Mapping[str, str]) -> str:

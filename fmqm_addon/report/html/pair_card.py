@@ -12,11 +12,12 @@ import numpy as np
 
 from ...comparison.judge import Judge
 from ..criteria import judge_of, shortfall
+from ..numbers import score_text
 from ..parts_table import part_cells, worst_first
-from ..records import PERCEIVED, SHOWN, value_of
+from ..records import PERCEIVED, SHOWN, shown_score, value_of
 from ..trust_table import Report, trust_lines
 from ..visual.colormap import NO_PATCH, score_colors
-from .fragments import MEGABYTE, bar, css, score, text
+from .fragments import MEGABYTE, bar, css, text
 from .size_curve import size_panel
 
 Record = Mapping[str, Any]
@@ -32,7 +33,7 @@ def pair_card(number: int, record: Record, name: str) -> str:
     whole_path = "" if name == path else f'<p class="faint">{text(path)}</p>'
     parts = [
         f'<div class="title"><div><h3>{text(name)}</h3>{whole_path}</div>'
-        f'<p class="score"><span class="faint">{judge.column}</span> {score(record, judge.column)}'
+        f'<p class="score"><span class="faint">{judge.column}</span> {shown_score(record, judge.column)}'
         f"{_impairment(record)}</p></div>",
         f'<p class="bad">Too low: {missed}.</p>' if (missed := shortfall(record)) else "",
     ]
@@ -71,7 +72,7 @@ def _impairment(record: Record) -> str:
 def _numbers(record: Record, columns: Iterable[str]) -> str:
     rows = "".join(
         f"<dt>{name.replace('_', ' ')}</dt><dd>{bar(value_of(record, name))}</dd>"
-        f'<dd class="number">{score(record, name)}</dd>'
+        f'<dd class="number">{shown_score(record, name)}</dd>'
         for name in columns
     )
     return f'<dl class="features">{rows}</dl>'
@@ -82,8 +83,8 @@ def _attribution(attribution: Record | None) -> str:
         return ""
     return (
         f'<p class="note">{escape(attribution["phrase"][:1].upper() + attribution["phrase"][1:])}: '
-        f"{attribution['geometry_loss']:.3f} of FMQM with the geometry alone distorted, "
-        f"{attribution['texture_loss']:.3f} with the texture alone.</p>"
+        f"{score_text(attribution['geometry_loss'], places=3)} of FMQM with the geometry alone distorted, "
+        f"{score_text(attribution['texture_loss'], places=3)} with the texture alone.</p>"
     )
 
 
@@ -124,8 +125,8 @@ def _close_ups(worst: Sequence[Record], judge: Judge) -> str:
     figures = "".join(
         f'<figure><div class="picture two">{_image(each["reference"], f"Worst patch {rank}, reference")}'
         f"{_image(each['distorted'], f'Worst patch {rank}, distorted')}</div>"
-        f"<figcaption><strong>{rank}</strong> {judge.column} {each[judge.column]:.3f}; {escape(each['blame'])} "
-        f"{each['value']:.3f}</figcaption></figure>"
+        f"<figcaption><strong>{rank}</strong> {judge.column} {score_text(each[judge.column], places=3)}; "
+        f"{escape(each['blame'])} {score_text(each['value'], places=3)}</figcaption></figure>"
         for rank, each in enumerate(worst, 1)
     )
     return (

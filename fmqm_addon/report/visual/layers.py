@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...metric.evaluation import Result
 from ...metric.fields import Fields
 from ...metric.geometry import Floats, dot
+from ..numbers import score_text
 from .colormap import GREY_DARK, GREY_LIGHT, SKY, VERMILION, number_colors, score_colors, signed_colors
 from .heat_map import fitted_range, round_ticks
 
@@ -229,7 +230,7 @@ def legend(
     score = float(result.of_patches(name).mean())
     place = min(max((score - low) / (high - low), 0.0), 1.0)
     heading = layer.label if layer.label.lower() == name.lower() else f"{layer.label} ({name})"
-    return Legend(heading, subtitle, bar, ticks, (place, f"{score:.4f}"))
+    return Legend(heading, subtitle, bar, ticks, (place, score_text(score)))
 
 
 def _number_text(step: float) -> Callable[[float], str]:

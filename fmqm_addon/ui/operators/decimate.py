@@ -16,6 +16,7 @@ from ...comparison.judge import Judge
 from ...metric.errors import FMQMError
 from ...metric.settings import Settings
 from ...metric.stepper import Stepper, Work
+from ...report.numbers import score_text
 from .. import session
 from ..modal import SteppedOperator
 from ..properties.decimate import FMQMDecimate
@@ -81,7 +82,7 @@ class FMQM_OT_decimate(SteppedOperator, bpy.types.Operator):  # noqa: N801
             self.report(
                 {"WARNING"},
                 f"{self._name} misses {found.target:.2f} even with {best.triangles:,} triangles"
-                + ("" if score is None else f" ({judge.column} {score:.4f})"),
+                + ("" if score is None else f" ({judge.column} {score_text(score)})"),
             )
             return {"CANCELLED"}
         copy = decimated_copy(original, best.version.ratio, f"{original.name} {judge.column} {found.target:.2f}")
@@ -96,7 +97,8 @@ class FMQM_OT_decimate(SteppedOperator, bpy.types.Operator):  # noqa: N801
             hidden = f"; {original.name} is hidden, Alt H shows it"
         self.report(
             {"INFO"},
-            f"{copy.name}: {best.triangles:,} of {result.triangles:,} triangles, {judge.column} {score:.4f}{hidden}",
+            f"{copy.name}: {best.triangles:,} of {result.triangles:,} triangles, "
+            f"{judge.column} {score_text(score)}{hidden}",
         )
         return {"FINISHED"}
 
@@ -129,7 +131,7 @@ def _write_path(decimate: FMQMDecimate, name: str, found: SearchResult, judge: J
 
 def _step_text(step: Step, judge: Judge) -> str:
     score = step.score(judge)
-    reached = "nothing left" if score is None else f"{score:.4f}"
+    reached = "nothing left" if score is None else score_text(score)
     return f"{step.triangles:,} triangles: {'about ' if step.quick else ''}{reached}"
 
 

@@ -10,6 +10,7 @@ import bpy
 from ...comparison.alignment import SPACE_LABELS
 from ...comparison.judge import Judge
 from ...report.explain import verdict
+from ...report.numbers import score_text
 from ...report.records import pair_record, size_text
 from ...report.words import LABELS
 from ..properties.rows import (
@@ -75,14 +76,13 @@ def _draw_scores(column: bpy.types.UILayout, row: FMQMRow) -> None:
         label = split.row()
         label.alignment = "LEFT"
         label.operator("fmqm.sort_rows", text=LABELS[name], emboss=False).column = name
-        error = f" ± {stderr[name]:.4f}" if stderr else ""
-        split.label(text=f"{scores[name]:.4f}{error}")
+        split.label(text=score_text(scores[name], stderr[name] if stderr else None))
     if reverse is None:
         return
     for judge in Judge:
         split = column.split(factor=0.5, align=True)
         split.label(text=f"    {LABELS[judge.column]} Reversed")
-        split.label(text=f"{judge.score(reverse):.4f}")
+        split.label(text=score_text(judge.score(reverse)))
 
 
 def _facts(row: FMQMRow) -> list[tuple[str, str]]:
@@ -92,7 +92,7 @@ def _facts(row: FMQMRow) -> list[tuple[str, str]]:
     switches = (("Up to (Hard Switch)", "strict"), ("Up to (Faded)", "fade")) if sizes else ()
     reference = f"{row.reference_name} (no modifiers)" if row.bare_reference else row.reference_name
     return [
-        *((label, f"{attribution[key]:.4f}") for label, key in losses if key in attribution),
+        *((label, score_text(attribution[key])) for label, key in losses if key in attribution),
         *((label, f"{size_text(sizes, kind)} px") for label, kind in switches),
         ("Original", reference),
         ("Triangles", f"{row.triangles:,} ({row.share:.3g} %)"),

@@ -9,6 +9,7 @@ import bpy
 
 from ...comparison.judge import Judge
 from ...report.explain import verdict
+from ...report.numbers import score_text
 from ...report.records import pair_record
 from ...report.words import LABELS
 from .. import session
@@ -66,8 +67,8 @@ def _cells(row: FMQMRow, scores: dict[str, float] | None) -> dict[str, str]:
     return {
         "triangles": short_count(row.triangles),
         "share": f"{row.share:.0f} %" if row.share >= 1 else f"{row.share:.1g} %",
-        "FMQM": f"{scores['FMQM']:.3f}",
-        "perceived": f"{scores['perceived']:.3f}",
+        "FMQM": score_text(scores["FMQM"], places=3),
+        "perceived": score_text(scores["perceived"], places=3),
     }
 
 
@@ -189,7 +190,7 @@ def _draw_verdict(layout: bpy.types.UILayout, context: bpy.types.Context, fmqm: 
         was = "" if former is None else f", was {former[judge.column]:.2f}"
         split = numbers.split(factor=0.4)
         split.label(text=LABELS[judge.column])
-        split.label(text=f"{scores[judge.column]:.4f}{was}")
+        split.label(text=f"{score_text(scores[judge.column])}{was}")
     bars = box.column(align=True)
     for name in Judge[fmqm.judge].features:
         split = bars.split(factor=0.5)
