@@ -15,7 +15,7 @@ EXTENSION_TOOL = $(RUN) $(VENV)/lib/python*/site-packages/bpy/*/scripts/addons_c
 # By the hashes of their files: what an index or a mirror serves otherwise is not installed.
 INSTALL = $(RUN) -m pip install --quiet --disable-pip-version-check --require-hashes
 
-.PHONY: demo pictures extension test test-all stress bench lint lock clean
+.PHONY: demo pictures extension test test-all stress bench lint lock three clean
 
 demo: $(VENV)/runs
 	$(RUN) scripts/demo.py --out out/demo
@@ -72,6 +72,13 @@ lock:
 	$(LOCK) $(ARGS) requirements-dev.in -o requirements-dev.txt
 	$(LOCK) -c requirements-dev.txt requirements-cluster.in -o requirements-cluster.txt
 	$(LOCK) -c requirements-dev.txt requirements.in -o requirements.txt
+
+# three.js for the report's viewer, anew from its npm package at the version that scripts/three has locked; needs node.
+three:
+	npm --prefix scripts/three ci --ignore-scripts --silent
+	npm --prefix scripts/three run --silent build -- --outfile=$(CURDIR)/fmqm_addon/report/html/viewer/three.js
+	cd scripts/three && { node -p '"three.js " + require("three/package.json").version + "\n"'; cat node_modules/three/LICENSE; } \
+	  > $(CURDIR)/fmqm_addon/report/html/viewer/three.LICENSE.txt
 
 clean:
 	rm -rf .venv out dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -88,7 +88,7 @@ def test_manifest() -> None:
     manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text())
     assert manifest["version"] == VERSION
     assert manifest["blender_version_min"] == "4.5.0"
-    assert manifest["license"] == ["SPDX:GPL-3.0-or-later"]
+    assert manifest["license"] == ["SPDX:GPL-3.0-or-later", "SPDX:MIT"]
     assert list(manifest["permissions"]) == ["files"]
     assert "wheels" not in manifest
     for text in (manifest["tagline"], *manifest["permissions"].values()):

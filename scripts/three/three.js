@@ -1,0 +1,28 @@
+// What the report's viewer uses of three.js.
+export {
+  BufferAttribute,
+  BufferGeometry,
+  Data3DTexture,
+  DataTexture,
+  DoubleSide,
+  FloatType,
+  GLSL3,
+  LinearFilter,
+  LinearMipmapLinearFilter,
+  Mesh,
+  MirroredRepeatWrapping,
+  NearestFilter,
+  PerspectiveCamera,
+  REVISION,
+  RGBAFormat,
+  RGBAIntegerFormat,
+  RepeatWrapping,
+  Scene,
+  ShaderMaterial,
+  Spherical,
+  Texture,
+  UnsignedShortType,
+  Vector3,
+  WebGLRenderer,
+} from "three";
+export { OrbitControls } from "three/addons/controls/OrbitControls.js";
