@@ -77,7 +77,7 @@ lock:
 three:
 	npm --prefix scripts/three ci --ignore-scripts --silent
 	npm --prefix scripts/three run --silent build -- --outfile=$(CURDIR)/fmqm_addon/report/html/viewer/three.js
-	cd scripts/three && { node -p '"three.js " + require("three/package.json").version + "\n"'; cat node_modules/three/LICENSE; } \
+	cd scripts/three && { node -p '"three.js " + require("./node_modules/three/package.json").version + "\n"'; cat node_modules/three/LICENSE; } \
 	  > $(CURDIR)/fmqm_addon/report/html/viewer/three.LICENSE.txt
 
 clean:

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from ..comparison.measurement import Measurement
     from ..comparison.pair import PairOptions, PairResult
     from ..metric.stepper import Stepper
+    from ..report.html.viewer.files import ReferenceFile
     from ..screen_size.measure import ScreenSizes
 
 T = TypeVar("T")
@@ -104,6 +105,7 @@ class _Scorer:
         self._log = log
         self._before_each = before_each
         self._sizes: ScreenSizes | None = None  # of the group's reference
+        self._reference_file: ReferenceFile | None = None  # of the group's reference, for the viewer
         self._units = 0  # of work done
         self._seconds: dict[str, float] = {}  # of the pair at hand, by stage
 
@@ -114,6 +116,7 @@ class _Scorer:
 
         row = group[0].row
         options = self._options.pair_of(row)
+        self._reference_file = None
         self._begin(group[0])
         began = time.perf_counter()
         failure = ""
@@ -194,6 +197,7 @@ class _Scorer:
             findings["pictures"] = write_pair_pictures(
                 self._options.report, stem, *surfaces, result, self._options.judge
             )
+            findings["viewer"] = self._viewer(answer)
         if self._options.explain:
             findings["where"] = where(answer.reference, result)
         if answer.attribution is not None:
@@ -204,6 +208,17 @@ class _Scorer:
             sized = self._work(self._sizes.measure(answer.alignment.mesh), f"rendering {row.id}")
             findings["screen_size"] = size_record(sized)
         return findings
+
+    def _viewer(self, answer: PairResult) -> dict[str, str]:
+        """What can be turned around on the page; of the reference once for its group."""
+        from ..report.html.viewer.files import write_pair_data, write_reference_data
+
+        folder, comparison = self._options.report, answer.comparison
+        if self._reference_file is None:
+            self._reference_file = write_reference_data(folder, answer.reference)
+        return write_pair_data(
+            folder, self._reference_file, comparison.distorted, comparison.result, self._options.judge
+        )
 
     def _screen_sizes(self, reference: AssetMesh) -> ScreenSizes | None:
         if not self._options.screen_size:

@@ -13,6 +13,7 @@ from ..comparison.impairment import IMPAIRMENTS
 from ..comparison.judge import Judge
 from ..metric.perceived import Perceived
 from .explain import explain
+from .html.viewer.files import is_viewer
 from .records import RECORD_KEYS, SHOWN, STAGES
 from .trust_table import GROUPS, trust_lines
 
@@ -240,6 +241,7 @@ _KINDS: dict[str, Any] = {
     "settings": is_settings,
     **dict.fromkeys(("fmqm_p10", "fail_under", "fail_under_p10"), lambda value: value is None or _is_share(value)),
     "pictures": _is_pictures,
+    "viewer": lambda value: value is None or is_viewer(value),
     "attribution": lambda value: value is None or is_attribution(value),
     "trust": lambda value: value is None or is_trust(value),
     "impairment": lambda value: value is None or value in {words for _, words in IMPAIRMENTS},

@@ -24,11 +24,13 @@ from ..records import TABLE, shown_score, value_of
 from .chain_curve import Level, curve_svg
 from .fragments import MEGABYTE, bar, text
 from .pair_card import pair_card
+from .viewer.files import write_programs
+from .viewer.markup import viewer_script, viewer_style
 
 PAGE = "index.html"
-# Only what lies beside the page is loaded, and only its own script runs, whatever a name might hold.
+# Only what lies beside the page is loaded; only its own scripts run, and what these load, whatever a name might hold.
 POLICY = """default-src 'none'; base-uri 'none'; form-action 'none'; img-src 'self' file: data:;
-style-src 'unsafe-inline'; script-src 'sha256-{}'"""
+style-src 'unsafe-inline'; script-src {} 'strict-dynamic'"""
 
 _TABLE = (
     '<section class="card scroll" tabindex="0" role="region" aria-label="All pairs"><table class="scores"><thead><tr>'
@@ -56,6 +58,7 @@ def write_page(
     Raises:
         FileError: it cannot be written; what stood there is left as it was.
     """
+    write_programs(folder)
     write_parts(os.path.join(folder, PAGE), page_parts(records, settings, versions))
 
 
@@ -63,7 +66,7 @@ def page_parts(records: Iterable[Record], settings: Mapping[str, Any], versions:
     """The text of the page; the arguments are those of write_page."""
     beside = Path(__file__).parent
     script = (beside / "page.js").read_text(encoding="utf-8")  # all that stands between the tags, as the digest wants
-    policy = POLICY.format(base64.b64encode(hashlib.sha256(script.encode()).digest()).decode())
+    policy = POLICY.format(f"{_hash(script)} {_hash(viewer_script())}")
     folder = _folder_to_leave_out(records)
     overview = _overview(records, folder)
     yield f"""<!DOCTYPE html>
@@ -75,7 +78,7 @@ def page_parts(records: Iterable[Record], settings: Mapping[str, Any], versions:
 <link rel="icon" href="data:,">
 <title>FMQM report</title>
 <style>
-{(beside / "page.css").read_text(encoding="utf-8")}</style>
+{(beside / "page.css").read_text(encoding="utf-8")}{viewer_style()}</style>
 </head>
 <body>
 <header>
@@ -98,9 +101,15 @@ def page_parts(records: Iterable[Record], settings: Mapping[str, Any], versions:
     yield f"""{_settings(settings, versions)}<p class="note">{escape(footnote(records))}</p>
 </main>
 <script>{script}</script>
+<script>{viewer_script()}</script>
 </body>
 </html>
 """
+
+
+def _hash(script: str) -> str:
+    """By which a policy lets an inline script run."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
 
 
 @dataclass(frozen=True)

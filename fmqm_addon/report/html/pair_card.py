@@ -19,6 +19,7 @@ from ..trust_table import Report, trust_lines
 from ..visual.colormap import NO_PATCH, score_colors
 from .fragments import MEGABYTE, bar, css, text
 from .size_curve import size_panel
+from .viewer.markup import viewer_markup
 
 Record = Mapping[str, Any]
 
@@ -46,6 +47,7 @@ def pair_card(number: int, record: Record, name: str) -> str:
         parts.append(f'<ul class="warnings" aria-label="Warnings">{items}</ul>')
     if pictures := record.get("pictures"):
         parts.append(_views(name, pictures))
+        parts.append(viewer_markup(record.get("viewer"), name))
     if record["FMQM"] is not None:
         close_ups = _close_ups(pictures["worst"], Judge(pictures["judge"])) if pictures else ""
         parts.append(

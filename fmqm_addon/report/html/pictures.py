@@ -30,6 +30,7 @@ from ..render import (
 )
 from ..texture_memory import texture_bytes
 from ..visual.worst import patch_view, worst_patches
+from .viewer.files import has_viewer_data
 
 PICTURES = "pictures"  # the folder beside the page
 VIEW_AREA = 560**2  # pixels of a view of the whole
@@ -61,7 +62,7 @@ def has_pictures(folder: str | None, record: Mapping[str, Any], judge: Judge) ->
     pictures = record.get("pictures")
     if pictures is None or pictures["judge"] != judge:
         return False
-    return os.path.exists(os.path.join(folder, pictures["heat"]))
+    return os.path.exists(os.path.join(folder, pictures["heat"])) and has_viewer_data(folder, record.get("viewer"))
 
 
 def picture_stem(*parts: str) -> str:

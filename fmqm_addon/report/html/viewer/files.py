@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The viewer's files beside the page: one for each reference and each level, and the programs that show them."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ....comparison.judge import Judge
+from ....metric.errors import FileError, OutputError
+from ....metric.evaluation import Result
+from ....metric.surface import Surface
+from ...atomic_files import write_text
+from .heat import heat_data
+from .mesh import mesh_data
+from .packing import script_text
+
+VIEWER = "viewer"  # the folder beside the page
+PROGRAMS = ("three.js", "viewer.js")
+_PARTS = ("shaders.js", "scene.js", "camera.js", "viewer.js")  # of viewer.js
+_DATA = re.compile(rf"{VIEWER}/[A-Za-z0-9-]+\.js")
+
+
+@dataclass(frozen=True)
+class ReferenceFile:
+    """A reference's file, for the pairs that share it.
+
+    Attributes:
+        path: relative to the report's folder, with / in between. images: digests of those that it holds.
+    """
+
+    path: str
+    images: frozenset[str]
+
+
+def write_reference_data(folder: str, reference: Surface) -> ReferenceFile:
+    """Writes what the viewer shows of a reference; the same reference gives the same file.
+
+    Args:
+        folder: of the report.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    data = mesh_data(reference)
+    return ReferenceFile(_write(folder, reference.name, {"mesh": data}), frozenset(data["images"]))
+
+
+def write_pair_data(
+    folder: str, shared: ReferenceFile, distorted: Surface, result: Result, judge: Judge
+) -> dict[str, str]:
+    """Writes what the viewer shows of a level: its mesh, and the heat of its comparison.
+
+    Args:
+        folder: of the report. shared: of write_reference_data, of the result's reference.
+
+    Returns:
+        What a record keeps as "viewer": paths relative to the folder.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    data = {
+        "reference": shared.path,
+        "judge": judge.column,
+        "mesh": mesh_data(distorted, shared.images),
+        "heat": heat_data(result, judge),
+    }
+    return {"reference": shared.path, "level": _write(folder, distorted.name, data)}
+
+
+def has_viewer_data(folder: str, viewer: Mapping[str, Any] | None) -> bool:
+    """Whether both files of a record's "viewer" are in a report's folder."""
+    return viewer is not None and all(os.path.exists(os.path.join(folder, path)) for path in viewer.values())
+
+
+def is_viewer(value: object) -> bool:
+    """Whether a record's "viewer" is one: names that write_pair_data could have given."""
+    return (
+        isinstance(value, Mapping)
+        and value.keys() == {"reference", "level"}
+        and all(isinstance(path, str) and _DATA.fullmatch(path) for path in value.values())
+    )
+
+
+def write_programs(folder: str) -> None:
+    """Puts the programs beside the data.
+
+    Raises:
+        FileError: they cannot be written.
+    """
+    _make_folder(folder)
+    beside = Path(__file__).parent
+    for name, parts in zip(PROGRAMS, (("three.js",), _PARTS), strict=True):
+        text = "\n".join((beside / part).read_text(encoding="utf-8") for part in parts)
+        write_text(os.path.join(folder, VIEWER, name), text)
+
+
+def _write(folder: str, name: str, data: Mapping[str, Any]) -> str:
+    """A script of a name for people and a digest of what it holds; returns its path."""
+    readable = re.sub(r"[^A-Za-z0-9]+", "-", Path(name).stem).strip("-")[:40] or "mesh"
+    digest = hashlib.sha256(script_text("", data).encode()).hexdigest()[:12]
+    path = f"{VIEWER}/{readable}-{digest}.js"
+    try:
+        _make_folder(folder)
+        write_text(os.path.join(folder, VIEWER, f"{readable}-{digest}.js"), script_text(path, data))
+    except FileError as error:
+        raise OutputError(str(error)) from error
+    return path
+
+
+def _make_folder(folder: str) -> None:
+    path = os.path.join(folder, VIEWER)
+    try:
+        os.makedirs(path, exist_ok=True)
+    except OSError as error:
+        raise FileError(f"{path}: this folder cannot be made ({error.strerror or error})") from error

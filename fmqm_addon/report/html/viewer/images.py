@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Images as data URIs, as large as a page can carry."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import io
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .skins import LARGEST_SIDE
+
+MOST_PIXELS = 4 * LARGEST_SIDE**2  # of the images of a mesh
+MOST_BYTES = 5_000_000  # of them, encoded
+_SMALLEST_SIDE = 64
+_LOSSLESS_SIDE = 512  # pixels; what is smaller stays as it is to the bit
+_JPEG_QUALITY = 92  # with full color resolution, as in the pictures
+
+Encoded = tuple[str, str]  # a digest of the content, and the data URI
+
+
+def encoded(images: Sequence[NDArray[np.uint8]]) -> list[Encoded]:
+    """The images as (digest, data URI); sides of at most LARGEST_SIDE, less where there are many or they are large.
+
+    Args:
+        images: (H, W, 3) uint8 each.
+    """
+    side = LARGEST_SIDE
+    while side > _SMALLEST_SIDE and sum(_pixels(image, side) for image in images) > MOST_PIXELS:
+        side //= 2
+    while True:
+        made = [_encoded(image, side) for image in images]
+        if side <= _SMALLEST_SIDE or sum(len(data) for _, data in made) <= MOST_BYTES:
+            return made
+        side //= 2
+
+
+def _size(image: NDArray[np.uint8], side: int) -> tuple[int, int]:
+    """Width and height, both within a side, in the image's proportions."""
+    height, width = image.shape[:2]
+    shrink = max(1.0, max(width, height) / side)
+    return max(1, round(width / shrink)), max(1, round(height / shrink))
+
+
+def _pixels(image: NDArray[np.uint8], side: int) -> int:
+    width, height = _size(image, side)
+    return width * height
+
+
+def _encoded(image: NDArray[np.uint8], side: int) -> Encoded:
+    from PIL import Image
+
+    picture, size = Image.fromarray(image), _size(image, side)
+    if size != picture.size:
+        picture = picture.resize(size, Image.Resampling.BOX)
+    digest = hashlib.sha256(f"{size}".encode() + picture.tobytes()).hexdigest()[:16]
+    out = io.BytesIO()
+    if max(size) <= _LOSSLESS_SIDE:
+        picture.save(out, "PNG")
+        kind = "png"
+    else:
+        picture.save(out, "JPEG", quality=_JPEG_QUALITY, subsampling=0)
+        kind = "jpeg"
+    return digest, f"data:image/{kind};base64,{base64.b64encode(out.getvalue()).decode()}"
