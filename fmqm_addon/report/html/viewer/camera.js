@@ -1,0 +1,134 @@
+"use strict";
+// Where one looks from: turned by mouse, touch and keys, and flown to places. Z is up, as in Blender.
+fmqmViewer.camera = (() => {
+  const AZIMUTH = 32, ELEVATION = 16; // degrees, as in the pictures: from the front (-Y) to the right, and up
+  const FIELD_OF_VIEW = 24; // degrees, from top to bottom
+  const MARGIN = 1.08;
+  const TURN = Math.PI / 24; // for a press of an arrow
+  const ZOOM = 1.15; // for a press of + or -
+  const FLIGHT = 500; // milliseconds
+  const STEEPEST = Math.PI / 2 - 0.01;
+
+  // Angles and distance of what lies around a target, and back.
+  function polar(offset) {
+    const radius = offset.length();
+    return { azimuth: Math.atan2(offset.x, -offset.y), elevation: Math.asin(offset.z / radius), radius };
+  }
+  function cartesian({ azimuth, elevation, radius }) {
+    const level = radius * Math.cos(elevation);
+    return new THREE.Vector3(level * Math.sin(azimuth), -level * Math.cos(azimuth), radius * Math.sin(elevation));
+  }
+
+  // element: where it is turned. changed: called whenever the view is another.
+  function cameraOf(element, box, changed) {
+    const camera = new THREE.PerspectiveCamera(FIELD_OF_VIEW);
+    camera.up.set(0, 0, 1);
+    const controls = new THREE.OrbitControls(camera, element);
+    controls.zoomToCursor = true;
+    controls.minDistance = 0.005;
+    controls.maxDistance = 20;
+    let flight = 0;
+    controls.addEventListener("change", changed);
+    controls.addEventListener("start", () => cancelAnimationFrame(flight));
+
+    function look(target, place) {
+      controls.target.copy(target);
+      camera.position.copy(target).add(cartesian(place));
+      controls.update();
+      changed();
+    }
+
+    function fly(target, place) {
+      cancelAnimationFrame(flight);
+      if (matchMedia("(prefers-reduced-motion: reduce)").matches) return look(target, place);
+      const from = controls.target.clone();
+      const start = polar(camera.position.clone().sub(from));
+      let turn = (place.azimuth - start.azimuth) % (2 * Math.PI);
+      if (Math.abs(turn) > Math.PI) turn -= 2 * Math.PI * Math.sign(turn);
+      const began = performance.now();
+      function step(now) {
+        const share = Math.min(Math.max((now - began) / FLIGHT, 0), 1);
+        const eased = share * share * (3 - 2 * share);
+        look(from.clone().lerp(target, eased), {
+          azimuth: start.azimuth + eased * turn,
+          elevation: start.elevation + eased * (place.elevation - start.elevation),
+          radius: start.radius * (place.radius / start.radius) ** eased,
+        });
+        if (share < 1) flight = requestAnimationFrame(step);
+      }
+      flight = requestAnimationFrame(step);
+    }
+
+    // The distance from which a width and a height are seen whole in a pane.
+    function distanceFor(width, height) {
+      const slope = Math.tan((FIELD_OF_VIEW * Math.PI) / 360);
+      return (MARGIN / 2 / slope) * Math.max(height, width / camera.aspect);
+    }
+
+    function home() {
+      const place = { azimuth: (AZIMUTH * Math.PI) / 180, elevation: (ELEVATION * Math.PI) / 180, radius: 1 };
+      const center = box.min.clone().add(box.max).multiplyScalar(0.5);
+      const back = cartesian(place);
+      const right = new THREE.Vector3(0, 0, 1).cross(back).normalize();
+      const up = back.clone().cross(right);
+      const half = box.max.clone().sub(center);
+      const reach = (axis) => Math.abs(axis.x) * half.x + Math.abs(axis.y) * half.y + Math.abs(axis.z) * half.z;
+      place.radius = reach(back) + distanceFor(2 * reach(right), 2 * reach(up));
+      return [center, place];
+    }
+
+    // A place from straight in front of it, with its surroundings.
+    function flyTo({ center, normal, diagonal }) {
+      const out = new THREE.Vector3(...normal);
+      const place = out.length() > 0 ? polar(out) : home()[1];
+      place.elevation = Math.min(Math.max(place.elevation, -STEEPEST), STEEPEST);
+      place.radius = distanceFor(3 * diagonal, 3 * diagonal);
+      fly(new THREE.Vector3(...center), place);
+    }
+
+    function turn(azimuth, elevation, zoom) {
+      const place = polar(camera.position.clone().sub(controls.target));
+      place.azimuth += azimuth;
+      place.elevation = Math.min(Math.max(place.elevation + elevation, -STEEPEST), STEEPEST);
+      place.radius = Math.min(Math.max(place.radius * zoom, controls.minDistance), controls.maxDistance);
+      look(controls.target.clone(), place);
+    }
+
+    const keys = {
+      ArrowLeft: () => turn(-TURN, 0, 1),
+      ArrowRight: () => turn(TURN, 0, 1),
+      ArrowUp: () => turn(0, TURN, 1),
+      ArrowDown: () => turn(0, -TURN, 1),
+      "+": () => turn(0, 0, 1 / ZOOM),
+      "=": () => turn(0, 0, 1 / ZOOM),
+      "-": () => turn(0, 0, ZOOM),
+      0: () => fly(...home()),
+    };
+    element.addEventListener("keydown", (event) => {
+      if (!Object.hasOwn(keys, event.key) || event.ctrlKey || event.metaKey || event.altKey) return;
+      event.preventDefault();
+      cancelAnimationFrame(flight);
+      keys[event.key]();
+    });
+
+    return {
+      camera,
+      flyTo,
+      reset: (atOnce) => (atOnce ? look(...home()) : fly(...home())),
+      // For a pane of so many pixels, before it is drawn.
+      shape(width, height) {
+        const distance = camera.position.distanceTo(controls.target);
+        camera.aspect = width / height;
+        camera.near = Math.max(distance - 2, distance / 100);
+        camera.far = distance + 2;
+        camera.updateProjectionMatrix();
+      },
+      dispose() {
+        cancelAnimationFrame(flight);
+        controls.dispose();
+      },
+    };
+  }
+
+  return { cameraOf };
+})();

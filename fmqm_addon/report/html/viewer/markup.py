@@ -27,7 +27,7 @@ def viewer_markup(viewer: Mapping[str, str] | None, name: str) -> str:
         return ""
     paths = " ".join(f'data-{key}="{escape(viewer[key])}"' for key in ("reference", "level"))
     return (
-        f'<section class="viewer" aria-label="3D view of {escape(name)}" {paths} hidden>'
+        f'<section class="viewer" aria-label="3D view of {escape(name)}" {paths}>'
         '<button type="button" class="viewer-open">Turn It Around</button>'
         '<p class="viewer-said" role="status"></p></section>'
     )
