@@ -160,7 +160,7 @@ def options_of(args: argparse.Namespace) -> BatchOptions:
         stand_in=bool(args.bake),
         limits=ImageLimits(args.max_image_side or DEFAULT_LIMITS.side, args.max_image_bytes or DEFAULT_LIMITS.decoded),
         access=Access(args.untrusted, args.asset_root or ""),
-        normals=args.screen_size,
+        normals=args.screen_size or bool(args.report),
         include=tuple(args.include),
         exclude=tuple(args.exclude),
         frame=args.frame,

@@ -360,7 +360,7 @@ def test_a_report_from_workers_resumed_draws_what_is_missing(run: Path) -> None:
     batch = (*FILES, "--report", "jobs", "--journal", "jobs.jsonl")
     assert score(*batch, "--jobs", "2", cwd=run).returncode == 1
     whole = files(run / "whole")
-    assert files(run / "jobs") == whole and len(whole) == 1 + 2 * 9
+    assert files(run / "jobs") == whole and len(whole) == 1 + 2 * 9 + 1 + 2 + 2
     kept, lost = sorted((run / "jobs" / "pictures").glob("*-heat.jpg"))
     lost.unlink()
     before = kept.stat().st_mtime_ns

@@ -28,9 +28,9 @@ from .viewer.files import write_programs
 from .viewer.markup import viewer_script, viewer_style
 
 PAGE = "index.html"
-# Only what lies beside the page is loaded; only its own scripts run, and what these load, whatever a name might hold.
+# Only what lies beside the page is loaded; only its own script runs, and what that loads, whatever a name might hold.
 POLICY = """default-src 'none'; base-uri 'none'; form-action 'none'; img-src 'self' file: data:;
-style-src 'unsafe-inline'; script-src {} 'strict-dynamic'"""
+style-src 'unsafe-inline'; script-src 'sha256-{}' 'strict-dynamic'"""
 
 _TABLE = (
     '<section class="card scroll" tabindex="0" role="region" aria-label="All pairs"><table class="scores"><thead><tr>'
@@ -58,15 +58,17 @@ def write_page(
     Raises:
         FileError: it cannot be written; what stood there is left as it was.
     """
-    write_programs(folder)
+    if any(record.get("viewer") for record in records):
+        write_programs(folder)
     write_parts(os.path.join(folder, PAGE), page_parts(records, settings, versions))
 
 
 def page_parts(records: Iterable[Record], settings: Mapping[str, Any], versions: Mapping[str, str]) -> Iterator[str]:
     """The text of the page; the arguments are those of write_page."""
     beside = Path(__file__).parent
-    script = (beside / "page.js").read_text(encoding="utf-8")  # all that stands between the tags, as the digest wants
-    policy = POLICY.format(f"{_hash(script)} {_hash(viewer_script())}")
+    # All that stands between the tags, as the digest wants.
+    script = (beside / "page.js").read_text(encoding="utf-8") + viewer_script()
+    policy = POLICY.format(base64.b64encode(hashlib.sha256(script.encode()).digest()).decode())
     folder = _folder_to_leave_out(records)
     overview = _overview(records, folder)
     yield f"""<!DOCTYPE html>
@@ -101,15 +103,9 @@ def page_parts(records: Iterable[Record], settings: Mapping[str, Any], versions:
     yield f"""{_settings(settings, versions)}<p class="note">{escape(footnote(records))}</p>
 </main>
 <script>{script}</script>
-<script>{viewer_script()}</script>
 </body>
 </html>
 """
-
-
-def _hash(script: str) -> str:
-    """By which a policy lets an inline script run."""
-    return f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
 
 
 @dataclass(frozen=True)
