@@ -191,26 +191,26 @@ def _undo(matrix: Floats, origin: Floats, name: str) -> Floats:
     try:
         return origin @ np.linalg.inv(matrix)
     except np.linalg.LinAlgError as error:
-        raise MeshError(f"{name}: its transform or the reference's has a scale of zero; apply or mend it") from error
+        raise MeshError(f"{name}: its transform or the original's has a scale of zero; apply or mend it") from error
 
 
 def _notes(name: str, chosen: Candidate, space: str, refined: Refined | None) -> tuple[str, ...]:
     parts = []
     if chosen.space == "location" and space == "auto":
-        parts.append("without its location, since it stands beside the reference")
+        parts.append("without its location, since it stands beside the original")
     elif chosen.space == "local" and space == "auto":
-        parts.append("in local space, since it fits the reference only without its transform")
+        parts.append("in local space, since it fits the original only without its transform")
     elif chosen.space == "centered":
-        parts.append("with its center at the reference's, since it fits far better there")
+        parts.append("with its center at the original's, since it fits far better there")
     if chosen.turn:
-        parts.append(f"turned by {chosen.turn}, since it fits the reference far better so")
+        parts.append(f"turned by {chosen.turn}, since it fits the original far better so")
     if chosen.factor != 1:
         parts.append(f"at its size divided by {chosen.factor:.6g}")
     if refined is not None:
         before, after = (f"{100 * distance:.3g} %" for distance in (refined.before, refined.after))
         parts.append(
             f"refined by ICP: turned by {refined.degrees:.3g} degrees, its points {after} of the diagonal from the "
-            f"reference in the place of {before}"
+            f"original in the place of {before}"
         )
     return (f"{name}: compared {', '.join(parts)}",) if parts else ()
 
@@ -225,9 +225,9 @@ def _warnings(
     if factor != 1:
         larger = f"{factor:.6g} times as large" if factor > 1 else f"{1 / factor:.6g} times as small"
         remedy = "are the units different? Match Scale (--match-scale) undoes that"
-        return (f"{name}: it is {larger} as the reference; {remedy}",)
+        return (f"{name}: it is {larger} as the original; {remedy}",)
     scale = np.linalg.norm(chosen.box[1] - chosen.box[0]) / np.linalg.norm(target[1] - target[0])
     return (
-        f"{name}: its box and the reference's differ by {100 * chosen.misfit:.0f} % of the diagonal (size "
+        f"{name}: its box and the original's differ by {100 * chosen.misfit:.0f} % of the diagonal (size "
         f"{100 * scale:.0f} %), as if they were placed differently; that lowers the score",
     )

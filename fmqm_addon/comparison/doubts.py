@@ -53,12 +53,12 @@ def _of_pair(
     if of["missing_parts_count"]:
         count, names = of["missing_parts_count"], of["missing_parts"]
         what = "a part" if count == 1 else f"{count} parts"
-        yield f"{distorted}: {what} of the reference {'is' if count == 1 else 'are'} gone: {listed(names, count)}"
+        yield f"{distorted}: {what} of the original {'is' if count == 1 else 'are'} gone: {listed(names, count)}"
     elif of["missing"] > MISSING and not blurred:
         edges = [side["open_edges"] for side in sides]
         hole = f", and it has {edges[1]:,} open edges instead of {edges[0]:,}" if edges[1] > edges[0] else ""
         yield (
-            f"{distorted}: {percent(of['missing'])} of the reference's area is gone{hole}; fill its holes, or restore "
+            f"{distorted}: {percent(of['missing'])} of the original's area is gone{hole}; fill its holes, or restore "
             "what is missing"
         )
     if of["color_shift"] > COLOR_SHIFT:
@@ -68,13 +68,13 @@ def _of_pair(
         )
     if of["transparency_lost"] > TRANSPARENCY:
         yield (
-            f"{distorted}: {percent(of['transparency_lost'])} of the samples lie where the reference is see-through "
+            f"{distorted}: {percent(of['transparency_lost'])} of the samples lie where the original is see-through "
             "and it is not; the scores cannot see that (is its alpha still linked?)"
         )
     if of["transparency_gained"] > TRANSPARENCY:
         yield (
             f"{distorted}: {percent(of['transparency_gained'])} of the samples lie where it is see-through and the "
-            "reference is not; the scores cannot see that (check its alpha)"
+            "original is not; the scores cannot see that (check its alpha)"
         )
     if of["maps_lost"]:
         yield (
@@ -83,22 +83,22 @@ def _of_pair(
         )
     if of["maps_added"]:
         yield (
-            f"{distorted}: it has a map for {listed(of['maps_added'])}, which the reference has not; the scores look "
+            f"{distorted}: it has a map for {listed(of['maps_added'])}, which the original has not; the scores look "
             "at the base color only"
         )
     if of["flipped"] > FLIPPED:
         yield (
             f"{distorted}: {percent(of['flipped'])} of its faces, by samples, look the other way than the "
-            "reference's; the score cannot see that (recalculate its normals)"
+            "original's; the score cannot see that (recalculate its normals)"
         )
     if of["added"] > ADDED and not blurred:
         yield (
-            f"{distorted}: {percent(of['added'])} of its area lies far from the reference; the score looks around "
-            "the reference only and cannot see that (Both Directions, --both, does)"
+            f"{distorted}: {percent(of['added'])} of its area lies far from the original; the score looks around "
+            "the original only and cannot see that (Both Directions, --both, does)"
         )
     if of["triangle_ratio"] > MORE_TRIANGLES:
         yield (
-            f"{distorted}: it has {of['triangle_ratio']:.3g} times the triangles of the reference; are the two in the "
+            f"{distorted}: it has {of['triangle_ratio']:.3g} times the triangles of the original; are the two in the "
             "wrong order?"
         )
     if of["sign_in_doubt_and_different"] > MOST_IN_DOUBT:
@@ -152,7 +152,7 @@ def _notes(reference: str, distorted: str, of: dict[str, Any]) -> Iterator[str]:
         yield _unsure(distorted, of)
     differ = [name for name in of["maps_not_seen"] if name not in {*of["maps_lost"], *of["maps_added"]}]
     if differ:
-        yield f"{distorted}: its maps for {listed(differ)} differ from the reference's; the scores do not look at them"
+        yield f"{distorted}: its maps for {listed(differ)} differ from the original's; the scores do not look at them"
 
 
 def _unsure(distorted: str, of: dict[str, Any]) -> str:

@@ -49,9 +49,7 @@ class PairOptions:
     align: str = setting(
         "none", "refine the placement: icp does so rigidly, for scans that stand a little askew", choices=ALIGNS
     )
-    both: bool = setting(
-        False, "score the other direction too, which sees what only the distorted has; takes twice as long"
-    )
+    both: bool = setting(False, "score the other direction too, which sees what only the LOD has; takes twice as long")
     attribution: bool = setting(
         False, "score geometry and texture apart too: whose loss it is; takes up to three times as long"
     )
@@ -153,7 +151,7 @@ def _alignment_facts(alignment: Alignment) -> tuple[Fact, ...]:
     return (
         Fact("space", alignment.label, "where the two were compared"),
         Fact("size_divided_by", alignment.factor, "factor between units"),
-        Fact("boxes_apart", alignment.misfit, "share of the reference's box diagonal"),
+        Fact("boxes_apart", alignment.misfit, "share of the original's box diagonal"),
     )
 
 

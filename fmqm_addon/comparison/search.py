@@ -51,7 +51,7 @@ class Search:
                     else (f"{1 / scaled.factor:.6g} times as small")
                 )
                 remedy = "are the units different, or was it normalized? Match Scale (--match-scale) undoes that"
-                warnings.append(f"{name}: it is {size} as the reference; {remedy}")
+                warnings.append(f"{name}: it is {size} as the original; {remedy}")
         centered = [each.matrix for each in self._turned(("centered",), chosen.factor)]
         mirrors = mirrored(centered, self.target.mean(axis=0))
         found = best_place([matrix for _, matrix in mirrors], now, self.points, self.surface)
@@ -59,7 +59,7 @@ class Search:
             axis = mirrors[found[0]][0]
             how = f"mirrored along {axis}" if axis else "mirrored and turned"
             warnings.append(
-                f"{name}: it fits the reference far better {how}; a mirrored asset is another one, and measured as it "
+                f"{name}: it fits the original far better {how}; a mirrored asset is another one, and measured as it "
                 "stands: mirror it back if that was not meant"
             )
         return tuple(warnings)

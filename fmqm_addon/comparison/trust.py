@@ -101,7 +101,7 @@ def assessing(
             Fact("see_through", _share(alpha < OPAQUE), "share of samples"),
             Fact("alpha_zero", _alpha_zero(surface, fields, alpha), "materials whose alpha is 0 everywhere"),
             Fact("magenta", _magenta_share(surface, fields), "share of samples"),
-            Fact("rounding", surface.rounding, "share of the reference's box diagonal"),
+            Fact("rounding", surface.rounding, "share of the original's box diagonal"),
             Fact("collapsed", _collapsed(surface), "share of triangles"),
         )
         for (surface, fields), doubt, alpha in zip(compared, doubtful, alphas, strict=True)
@@ -121,18 +121,18 @@ def assessing(
         Fact("color_shift_largest", float(shifts.max()), f"{COLOR_UNIT}, of a patch"),
         Fact("transparency_lost", _share(lost), "share of samples"),
         Fact("transparency_gained", _share(gained), "share of samples"),
-        Fact("missing", there.beyond, "share of the reference's area"),
-        Fact("missing_parts", list(parts.missing), "parts of the reference"),
+        Fact("missing", there.beyond, "share of the original's area"),
+        Fact("missing_parts", list(parts.missing), "parts of the original"),
         Fact("missing_parts_count", parts.missing_count, "parts"),
-        Fact("added", back.beyond, "share of the distorted mesh's area"),
+        Fact("added", back.beyond, "share of the LOD's area"),
         Fact("added_beyond", reach * scale, "scene units"),
         *_distance_facts("distance_to_distorted", there, scale, _diagonal(reference)),
         *_distance_facts("distance_to_reference", back, scale, _diagonal(reference)),
-        Fact("size", _diagonal(distorted) / _diagonal(reference), "of the reference's box diagonal"),
-        Fact("triangle_ratio", len(distorted.triangles) / len(reference.triangles), "times the reference's"),
+        Fact("size", _diagonal(distorted) / _diagonal(reference), "of the original's box diagonal"),
+        Fact("triangle_ratio", len(distorted.triangles) / len(reference.triangles), "times the original's"),
         _images_fact(same_images(reference, distorted)),
-        Fact("maps_lost", maps_lost, "maps that only the reference has"),
-        Fact("maps_added", maps_added, "maps that only the distorted mesh has"),
+        Fact("maps_lost", maps_lost, "maps that only the original has"),
+        Fact("maps_added", maps_added, "maps that only the LOD has"),
         Fact("maps_not_seen", differing_maps(reference, distorted), "maps that differ"),
     )
     facts = ((*known, *sides[0]), (*own, *sides[1]))
@@ -214,8 +214,8 @@ def _patch_facts(result: Result) -> tuple[Fact, ...]:
         Fact("samples", len(result.samples.positions), "samples"),
         Fact("patches", len(result.patches), "patches"),
         Fact("patches_extended", sum(patch.extended for patch in result.patches), "patches"),
-        Fact("triangles_after_splitting", len(mesh.triangles), "triangles of the reference"),
-        Fact("covered", covered_share(result), "share of the reference's area"),
+        Fact("triangles_after_splitting", len(mesh.triangles), "triangles of the original"),
+        Fact("covered", covered_share(result), "share of the original's area"),
     )
 
 
@@ -223,7 +223,7 @@ def _width_facts(result: Result) -> tuple[Fact, Fact]:
     """Of the patches that grew without a jump: where triangles are as long as the box, they decide the score."""
     width = np.array([0.0 if patch.extended else patch.diagonal for patch in result.patches])
     return (
-        Fact("widest_patch", min(float(width.max()), 1.0), "share of the reference's box diagonal"),
+        Fact("widest_patch", min(float(width.max()), 1.0), "share of the original's box diagonal"),
         Fact("wide_patches", _share(width > WIDE), "share of patches that span half of it"),
     )
 
@@ -236,7 +236,7 @@ def _distance_facts(name: str, found: Apart, scale: float, box: float) -> tuple[
         Fact(
             f"{name}_of_box",
             {key: value / box for key, value in values.items()},
-            "share of the reference's box diagonal",
+            "share of the original's box diagonal",
         ),
     )
 

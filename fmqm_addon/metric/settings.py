@@ -105,7 +105,7 @@ class Settings:
         minimum=1,
         maximum=MAX_SAMPLES,
     )
-    patches: int = setting(250, "number of patches that the reference is divided into", minimum=1)
+    patches: int = setting(250, "number of patches that the original is divided into", minimum=1)
     scored_patches: int | None = setting(
         None,
         "how many patches are scored, the first ones, which are spread evenly, at full density",

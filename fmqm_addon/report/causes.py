@@ -46,7 +46,7 @@ def causes(features: Mapping[str, float], facts: Facts) -> Iterator[str]:
         )
     opened = [side.get("open_edges") for side in (facts.reference, facts.distorted)]
     if opened[0] == 0 and opened[1]:
-        yield f"Its shell is open, with {opened[1]:,} open edges where the reference has none; fill the holes."
+        yield f"Its shell is open, with {opened[1]:,} open edges where the original has none; fill the holes."
     if JUST_NOTICEABLE <= (of.get("color_shift") or 0) <= COLOR_SHIFT:
         yield (
             f"Its colors have shifted by {of['color_shift']:.1f} on average (CIE 1976); compare base colors and the "
@@ -61,7 +61,7 @@ def _of_texture(features: Mapping[str, float], facts: Facts) -> Iterator[str]:
     if sides[0] and sides[1] and sides[1] < _SMALLER * sides[0]:
         yield f"Its texture is smaller, {sides[1]} pixels a side instead of {sides[0]}; keep a larger one."
     elif facts.pair.get("same_images") and min(features["shape"], features["facing"]) >= _LOW:
-        yield "It has the reference's own images, which lie on it differently; its UVs have moved or a seam is broken."
+        yield "It has the original's own images, which lie on it differently; its UVs have moved or a seam is broken."
     elif facts.pair.get("same_images") is False and features["detail"] < min(_LOW, features["color"]):
         yield "Its texture is another one: blurred, compressed more, or baked anew; compare the images."
 

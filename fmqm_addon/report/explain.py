@@ -160,7 +160,7 @@ def _sureness(record: Mapping[str, Any], facts: Facts) -> str:
     if stderr is not None and 2 * stderr["score"] > PERCEIVED_NOISE:
         sentences.append(f"Other random samples move perceived by about {2 * stderr['score']:.2g}.")
     if record["patches"] >= FEW_PATCHES and (facts.pair.get("covered") or 1) < LEAST_COVERED:
-        sentences.append("Much of the reference was not looked at.")
+        sentences.append("Much of the original was not looked at.")
     if record["warnings"]:
         others = len(record["warnings"]) - 1
         more = f" (and {others} more {'warning' if others == 1 else 'warnings'})" if others else ""

@@ -19,6 +19,7 @@ from .labels import shorten
 from .numbers import score_text
 from .render import BACKGROUND, Camera, natural_aspect, require_pillow, score_by_face, three_views
 from .visual.colormap import NO_PATCH, score_colors
+from .words import LABELS, LOD, ORIGINAL
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -71,11 +72,12 @@ def compose(
         canvas.paste(Image.fromarray(view), (sheet.left(index), sheet.top))
     draw = ImageDraw.Draw(canvas)
     score = float(result.of_patches(judge.column).mean())
-    features = [f"{name} {score_text(result.of_patches(name).mean(), places=3)}" for name in judge.features]
-    sheet.label(draw, 0, "Reference", reference.name, f"{len(reference.triangles):,} triangles")
-    sheet.label(draw, 1, "Distorted", distorted.name, f"{len(distorted.triangles):,} triangles")
-    sheet.label(draw, 2, f"{judge.column} {score_text(score)}", "   ".join(features[:2]), "   ".join(features[2:]))
-    sheet.color_bar(draw, judge.column, score, bool(np.isnan(faces).any()))
+    features = [f"{LABELS[name]} {score_text(result.of_patches(name).mean(), places=3)}" for name in judge.features]
+    sheet.label(draw, 0, ORIGINAL, reference.name, f"{len(reference.triangles):,} triangles")
+    sheet.label(draw, 1, LOD, distorted.name, f"{len(distorted.triangles):,} triangles")
+    heading = f"{LABELS[judge.column]} {score_text(score)}"
+    sheet.label(draw, 2, heading, "   ".join(features[:2]), "   ".join(features[2:]))
+    sheet.color_bar(draw, LABELS[judge.column], score, bool(np.isnan(faces).any()))
     return canvas
 
 

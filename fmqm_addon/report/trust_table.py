@@ -10,6 +10,7 @@ from ..comparison.surface_facts import Fact
 from ..comparison.trust import Trust
 from ..metric.errors import one_line
 from .numbers import value_text
+from .words import plain
 
 Report = dict[str, dict[str, dict[str, Any]]]  # group, fact, "value" and "unit"
 
@@ -30,7 +31,7 @@ class Line:
     """A fact as people read it.
 
     Attributes:
-        label: what. values: of the pair, or of reference and distorted. unit: of them.
+        label: what. values: of the pair, or of original and LOD. unit: of them.
     """
 
     label: str
@@ -49,12 +50,13 @@ def trust_lines(report: Report) -> list[Line]:
     apart = _APART if _was_baked(reference) or _was_baked(distorted) else {*_APART, "baked_at"}
     lines += [Line(_label(name), (_text(item),), _unit(item)) for name, item in pair.items() if name not in apart]
     for group in GROUPS[:2]:
+        side = plain(group)
         lines += [
-            Line(f"{_label(name)}, {group}", (_text(item),), _unit(item))
+            Line(f"{_label(name)}, {side}", (_text(item),), _unit(item))
             for name, item in report[group].items()
             if name not in _APART and _is_long(item)
         ]
-        lines += [Line(f"{image['role']}, {group}", (_image_text(image),), "") for image in _images(report[group])]
+        lines += [Line(f"{image['role']}, {side}", (_image_text(image),), "") for image in _images(report[group])]
     return lines
 
 
@@ -62,9 +64,10 @@ def trust_text(report: Report) -> str:
     """An aligned table."""
     lines = trust_lines(report)
     labels = max(len(line.label) for line in lines)
-    both = [GROUPS[:2], *(line.values for line in lines if len(line.values) == 2)]
+    heads = tuple(map(plain, GROUPS[:2]))
+    both = [heads, *(line.values for line in lines if len(line.values) == 2)]
     widths = [max(len(values[k]) for values in both) for k in range(2)]
-    rows = [f"{'':{labels}}  {'reference':>{widths[0]}}  {'distorted':>{widths[1]}}"]
+    rows = [f"{'':{labels}}  {heads[0]:>{widths[0]}}  {heads[1]:>{widths[1]}}"]
     for line in lines:
         if len(line.values) == 2:
             cells = "  ".join(value.rjust(width) for value, width in zip(line.values, widths, strict=True))
@@ -80,7 +83,7 @@ def _fact_dict(fact: Fact) -> dict[str, Any]:
 
 
 def _label(name: str) -> str:
-    return name.replace("_", " ").replace("uv ", "UV ").replace("non manifold", "non-manifold")
+    return plain(name).replace("uv ", "UV ").replace("non manifold", "non-manifold")
 
 
 def _unit(*items: dict[str, Any]) -> str:

@@ -10,10 +10,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..metric.settings import PRESETS, SETTING_NAMES, Settings
-from .records import PERCEIVED, SHOWN
 
 ORIGINAL, LOD = "Original", "LOD"
-GROUPS = {"reference": ORIGINAL, "distorted": LOD, "pair": "Pair"}  # of the trust report
 PRESET_LABELS = {"paper": "Full", "fast": "Quick"}
 CUSTOM = "Custom"  # settings of no preset
 
@@ -49,8 +47,12 @@ MEANINGS = {
     "detail": "Slopes of the colors. Low where the texture is blurred, moved or broken up",
     "perceived_p10": "A tenth of the patches has a perceived quality below this",
 }
-assert set(LABELS) == set(MEANINGS) == {*SHOWN, *PERCEIVED}
 assert set(PRESET_LABELS) == set(PRESETS)
+
+
+def plain(name: str) -> str:
+    """A name from a record or a trust report as words in a sentence."""
+    return name.replace("_", " ").replace("distorted", LOD).replace("reference", ORIGINAL.lower())
 
 
 def preset_label(settings: Mapping[str, Any]) -> str:

@@ -161,7 +161,7 @@ def test_verbose_prints_the_report_below_the_scores(assets: Path) -> None:
     ]
     for report, image in zip(reports, ("a.png", "b.png"), strict=True):
         assert re.search(r"^triangles +576 +576  triangles$", report, re.MULTILINE)
-        assert re.search(rf"^base color, distorted +{image}, 16 x 16, sRGB$", report, re.MULTILINE)
+        assert re.search(rf"^base color, LOD +{image}, 16 x 16, sRGB$", report, re.MULTILINE)
 
 
 def test_both_directions(assets: Path, tmp_path: Path) -> None:

@@ -79,7 +79,7 @@ def test_auto_turns_about_x(degrees: int, matrix: np.ndarray) -> None:
     np.testing.assert_allclose(alignment.mesh.positions, reference.world().positions, atol=1e-12)
     assert f"turned by {degrees} degrees about X" in alignment.label
     assert alignment.notes == (
-        f"lod: compared turned by {degrees} degrees about X, since it fits the reference far better so",
+        f"lod: compared turned by {degrees} degrees about X, since it fits the original far better so",
     )
     assert not alignment.warnings and location_counts(alignment.label)
 

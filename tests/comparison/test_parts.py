@@ -50,7 +50,7 @@ def test_connected_parts_are_those_of_a_flood(rows: list[tuple[int, int, int]]) 
 def test_a_part_that_is_gone_is_named() -> None:
     trust, *_ = assess(device(0, 1, 2), device(0, 2))
     assert values(trust.pair)["missing_parts"] == ["Knob 1"]
-    assert "a part of the reference is gone: Knob 1" in trust.warnings[0]
+    assert "a part of the original is gone: Knob 1" in trust.warnings[0]
     assert [part.name for part in trust.parts if part.missing and part.kind == "object"] == ["Knob 1"]
     named = [part.name for part in trust.parts if part.missing and part.kind == "connected"]
     assert len(named) == 1 and named[0].startswith("Knob 1, piece 3 of 4")
@@ -60,7 +60,7 @@ def test_one_object_is_told_piece_by_piece() -> None:
     reference, distorted = (replace(device(*knobs), objects=(), object=None) for knobs in (range(12), ()))
     trust, *_ = assess(reference, distorted)
     assert values(trust.pair)["missing_parts_count"] == 12
-    assert "12 parts of the reference are gone" in trust.warnings[0] and "and 9 more" in trust.warnings[0]
+    assert "12 parts of the original are gone" in trust.warnings[0] and "and 9 more" in trust.warnings[0]
 
 
 def test_a_part_that_is_simplified_or_moved_a_little_is_not_gone() -> None:

@@ -84,7 +84,7 @@ def test_a_moved_pivot_is_centered() -> None:
     alignment = aligned(LOPSIDED, moved(LOPSIDED, at(shift=(0, 0, 1.4))))
     assert alignment.label == "centered" and not location_counts(alignment.label)
     np.testing.assert_allclose(alignment.mesh.positions, LOPSIDED.positions, atol=1e-12)
-    assert alignment.notes == ("ball: compared with its center at the reference's, since it fits far better there",)
+    assert alignment.notes == ("ball: compared with its center at the original's, since it fits far better there",)
 
 
 def test_colors_tell_the_turn_of_what_is_round() -> None:

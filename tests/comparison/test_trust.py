@@ -315,8 +315,8 @@ def test_report_as_a_table_is_aligned_and_shares_are_percents() -> None:
     lines = {line.label: line for line in trust_lines(report)}
     assert lines["sign in doubt"].values == ("0 %", "100 %") and lines["sign in doubt"].unit == "of samples"
     assert lines["watertight"].values == ("yes", "yes") and lines["UV outside"].values == ("?", "?")
-    assert lines["samples by material, distorted"].values == ("material 0 100 %",)
+    assert lines["samples by material, LOD"].values == ("material 0 100 %",)
     rows = trust_text(report).splitlines()
-    column = rows[0].index("distorted") + len("distorted")
+    column = rows[0].index("LOD") + len("LOD")
     assert rows[1].startswith("triangles") and rows[1][:column].endswith(" 80")
     assert len(rows) == len(lines) + 1

@@ -93,7 +93,7 @@ def test_paragraphs(given: dict[str, Any], text: str) -> None:
         ({"where": located(0.5, "top")}, "has about half of the loss, at the top."),
         ({"warnings": ["b.glb: it is loose"]}, "Before believing it: b.glb: it is loose."),
         ({"warnings": ["first", "second", "third"]}, "Before believing it: first (and 2 more warnings)."),
-        ({"trust": facts(covered=0.5)}, "Much of the reference was not looked at."),
+        ({"trust": facts(covered=0.5)}, "Much of the original was not looked at."),
         ({"trust": facts(triangle_ratio=0.25)}, "With 25 % of the triangles its silhouette and shading are faceted"),
         ({"trust": facts({"open_edges": 0}, {"open_edges": 12})}, "Its shell is open, with 12 open edges"),
         ({"trust": facts(color_shift=3.0)}, "Its colors have shifted by 3.0 on average"),

@@ -41,7 +41,7 @@ class BVHQuery:
             if None in found:  # a bound that rounding made too small
                 found = [find(p)[2] if i is None else i for i, p in zip(found, _tuples(points), strict=True)]
         if None in found:
-            raise MeshError("the mesh is too small and too far from the reference to be measured against it")
+            raise MeshError("the mesh is too small and too far from the original to be measured against it")
         return np.array(found, np.int64)
 
     def first_hit(self, origins: Floats, directions: Floats) -> tuple[Ints, Floats]:

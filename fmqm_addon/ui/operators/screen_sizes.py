@@ -29,7 +29,7 @@ class FMQM_OT_screen_sizes(SteppedOperator, bpy.types.Operator):  # noqa: N801
     bl_idname = "fmqm.screen_sizes"
     bl_label = "Screen Sizes"
     bl_description = (
-        "Find at which size on screen each of the results may be shown in place of the chosen one's reference: renders "
+        "Find at which size on screen each of the results may be shown in place of the chosen one's original: renders "
         "of base color and smooth shading are compared. Esc cancels"
     )
     bl_options: ClassVar = {"UNDO"}

@@ -41,10 +41,8 @@ class FMQM_PT_trust(Sidebar, bpy.types.Panel):  # noqa: N801
 
 def _draw_fact(layout: bpy.types.UILayout, context: bpy.types.Context, line: Line) -> None:
     """In one line where there is room for it; else its unit, or why it is not known, goes below, and a long value."""
-    # What reports call distorted is the LOD here. One value where both have the same: the sidebar is narrow.
-    texts = (line.label, line.unit)
-    label, unit = (text.replace("distorted", "LOD").replace("reference", "original") for text in texts)
-    value = " / ".join(dict.fromkeys(line.values))
+    label, unit = line.label, line.unit
+    value = " / ".join(dict.fromkeys(line.values))  # one where both have the same: the sidebar is narrow
     if unit.partition(" ")[0] in label.split():  # vertices welded are vertices
         unit = ""
     space = room(context, 40) - len(label) - 2

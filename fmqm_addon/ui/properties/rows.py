@@ -33,7 +33,7 @@ class FMQMRow(bpy.types.PropertyGroup):
     reference_name: StringProperty(name="Original", description="What it was compared with")
     kind: StringProperty(name="Kind", description="Whether it is an object or a collection")
     reference_kind: StringProperty(name="Original Kind", description="Whether the original is one or the other")
-    bare_reference: BoolProperty(name="Bare Reference", description="The original was measured without modifiers")
+    bare_reference: BoolProperty(name="Bare Original", description="The original was measured without modifiers")
     scores: StringProperty(name="Scores", description="FMQM, perceived and their errors in double precision, as JSON")
     former: StringProperty(name="Former Scores", description="As Scores, of the measurement before; empty: none")
     triangles: IntProperty(name="Triangles", description="Triangles of the LOD", min=0)
