@@ -21,6 +21,7 @@ from .. import session
 from ..modal import SteppedOperator
 from ..properties.decimate import FMQMDecimate
 from ..properties.settings import metric_settings
+from .polls import allowed
 
 
 class FMQM_OT_decimate(SteppedOperator, bpy.types.Operator):  # noqa: N801
@@ -36,10 +37,7 @@ class FMQM_OT_decimate(SteppedOperator, bpy.types.Operator):  # noqa: N801
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        reason = _why_not(context)
-        if reason:
-            cls.poll_message_set(reason)
-        return not reason
+        return allowed(cls, _why_not(context))
 
     def begin(self, context: bpy.types.Context) -> bool:
         fmqm, self._name = context.scene.fmqm, context.active_object.name_full

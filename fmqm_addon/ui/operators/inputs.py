@@ -10,8 +10,9 @@ import bpy
 
 from ...blender.scene.lods import are_kin, find_lods
 from ...blender.scene.members import lineage
-from ..properties.items import is_asset, item_target, kept
+from ..properties.items import FMQMItem, is_asset, item_target, kept
 from ..properties.scene import FMQMScene
+from .polls import allowed
 
 
 def _selected_assets(context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -62,6 +63,11 @@ def reference_of(fmqm: FMQMScene) -> bpy.types.Object | bpy.types.Collection | N
     return kept(fmqm.reference) if fmqm.reference_kind == "OBJECT" else fmqm.reference_collection
 
 
+def _chosen(fmqm: FMQMScene) -> FMQMItem | None:
+    """Of the list of LODs."""
+    return fmqm.compared[fmqm.compared_index] if 0 <= fmqm.compared_index < len(fmqm.compared) else None
+
+
 class FMQM_OT_use_selection(bpy.types.Operator):  # noqa: N801
     bl_idname = "fmqm.use_selection"
     bl_label = "Use Selection"
@@ -70,14 +76,12 @@ class FMQM_OT_use_selection(bpy.types.Operator):  # noqa: N801
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        active = context.active_object
+        active, why = context.active_object, ""
         if active is None or not is_asset(active):
-            cls.poll_message_set("Make the original the active object: click it last")
-            return False
-        if not any(o != active and is_asset(o) for o in context.selected_objects):
-            cls.poll_message_set("Select the objects to compare, and the original last")
-            return False
-        return True
+            why = "Make the original the active object: click it last"
+        elif not any(o != active and is_asset(o) for o in context.selected_objects):
+            why = "Select the objects to compare, and the original last"
+        return allowed(cls, why)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         fmqm, active = context.scene.fmqm, context.active_object
@@ -127,14 +131,12 @@ class FMQM_OT_own_modifiers(bpy.types.Operator):  # noqa: N801
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        active = context.active_object
+        active, why = context.active_object, ""
         if active is None or active.type != "MESH":
-            cls.poll_message_set("Make a mesh object active")
-            return False
-        if not active.modifiers:
-            cls.poll_message_set(f"{active.name} has no modifiers")
-            return False
-        return True
+            why = "Make a mesh object active"
+        elif not active.modifiers:
+            why = f"{active.name} has no modifiers"
+        return allowed(cls, why)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         fmqm, active = context.scene.fmqm, context.active_object
@@ -152,10 +154,8 @@ class FMQM_OT_add_selected(bpy.types.Operator):  # noqa: N801
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not any(is_asset(o) for o in context.selected_objects):
-            cls.poll_message_set("Select objects with a surface, or an empty with such objects")
-            return False
-        return True
+        there = any(is_asset(o) for o in context.selected_objects)
+        return allowed(cls, "" if there else "Select objects with a surface, or an empty with such objects")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         fmqm = context.scene.fmqm
@@ -175,10 +175,8 @@ class FMQM_OT_add_collection(bpy.types.Operator):  # noqa: N801
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if context.collection is None or context.collection == context.scene.collection:
-            cls.poll_message_set("Choose a collection in the outliner")
-            return False
-        return True
+        chosen = context.collection not in (None, context.scene.collection)
+        return allowed(cls, "" if chosen else "Choose a collection in the outliner")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         fmqm = context.scene.fmqm
@@ -196,7 +194,7 @@ class FMQM_OT_remove_compared(bpy.types.Operator):  # noqa: N801
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return 0 <= context.scene.fmqm.compared_index < len(context.scene.fmqm.compared)
+        return allowed(cls, "" if _chosen(context.scene.fmqm) else "Choose an LOD in the list")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         fmqm = context.scene.fmqm
@@ -213,14 +211,13 @@ class FMQM_OT_swap(bpy.types.Operator):  # noqa: N801
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        fmqm = context.scene.fmqm
+        fmqm, why = context.scene.fmqm, ""
+        chosen = _chosen(fmqm)
         if fmqm.bare_reference:
-            cls.poll_message_set("The original is the same object without its modifiers")
-            return False
-        if reference_of(fmqm) is None or not 0 <= fmqm.compared_index < len(fmqm.compared):
-            cls.poll_message_set("Choose an original and an LOD")
-            return False
-        return item_target(fmqm.compared[fmqm.compared_index]) is not None
+            why = "The original is the same object without its modifiers"
+        elif reference_of(fmqm) is None or chosen is None or item_target(chosen) is None:
+            why = "Choose an original and an LOD"
+        return allowed(cls, why)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         fmqm = context.scene.fmqm
@@ -243,7 +240,7 @@ class FMQM_OT_clear_compared(bpy.types.Operator):  # noqa: N801
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return bool(context.scene.fmqm.compared)
+        return allowed(cls, "" if context.scene.fmqm.compared else "The list is empty")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         set_compared(context.scene.fmqm, [])

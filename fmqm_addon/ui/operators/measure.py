@@ -25,6 +25,7 @@ from ..properties.scene import FMQMScene
 from ..properties.settings import pair_options, patterns_of
 from ..view.shown import forget_removed, show_heat_map
 from .inputs import reference_of
+from .polls import allowed
 
 
 def why_not(fmqm: FMQMScene) -> str:
@@ -54,10 +55,7 @@ class FMQM_OT_measure(SteppedOperator, bpy.types.Operator):  # noqa: N801
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        reason = "A measurement is running" if session.job is not None else why_not(context.scene.fmqm)
-        if reason:
-            cls.poll_message_set(reason)
-        return not reason
+        return allowed(cls, "A measurement is running" if session.job is not None else why_not(context.scene.fmqm))
 
     def begin(self, context: bpy.types.Context) -> bool:
         fmqm = context.scene.fmqm

@@ -8,7 +8,7 @@ import bpy
 from ...metric.errors import FMQMError
 from ..view import heat, units
 from ..view.result import look_of
-from .view import has_samples
+from .polls import allowed, no_viewport
 
 _REACH = 14  # pixels around the mouse in which a sample is picked
 _STATUS = "Click: Choose Sample    Esc, Right Click: Finish"
@@ -22,10 +22,7 @@ class FMQM_OT_unit_pick(bpy.types.Operator):  # noqa: N801
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if context.area is None or context.area.type != "VIEW_3D":
-            cls.poll_message_set("Needs a 3D viewport")
-            return False
-        return has_samples(cls, context)
+        return allowed(cls, no_viewport(context))
 
     def invoke(self, context: bpy.types.Context, _: bpy.types.Event) -> set[str]:
         self._area = context.area

@@ -8,7 +8,7 @@ import bpy
 from ..view import heat, overlay, probe
 from ..view.result import look_of
 from .pick import holds
-from .view import has_samples
+from .polls import allowed, no_viewport
 
 _STATUS = "Move: Values under the Mouse    Drag an End of the Legend: Range    Esc, Right Click: Finish"
 _REACH = 12  # pixels around an end of the legend's bar in which it is taken
@@ -23,10 +23,7 @@ class FMQM_OT_probe(bpy.types.Operator):  # noqa: N801
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if context.area is None or context.area.type != "VIEW_3D":
-            cls.poll_message_set("Needs a 3D viewport")
-            return False
-        return has_samples(cls, context)
+        return allowed(cls, no_viewport(context))
 
     def invoke(self, context: bpy.types.Context, _: bpy.types.Event) -> set[str]:
         self._area, self._end = context.area, ""

@@ -12,15 +12,9 @@ from ...report.records import table_text
 from ...report.words import LABELS, MEANINGS
 from ..properties.rows import active_row, is_whole, pair_of, row_scores
 from ..view.shown import forget_removed
+from .polls import allowed, no_rows
 
 _COLUMNS = [(name, label, MEANINGS[name]) for name, label in LABELS.items()]
-
-
-def has_rows(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    if not context.scene.fmqm.rows:
-        cls.poll_message_set("Nothing has been measured yet")
-        return False
-    return True
 
 
 def broken_text(count: int) -> str:
@@ -45,7 +39,7 @@ class FMQM_OT_sort_rows(bpy.types.Operator):  # noqa: N801
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return has_rows(cls, context)
+        return allowed(cls, no_rows(context))
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         fmqm = context.scene.fmqm
@@ -75,7 +69,7 @@ class FMQM_OT_remove_row(bpy.types.Operator):  # noqa: N801
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return has_rows(cls, context)
+        return allowed(cls, no_rows(context))
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         fmqm = context.scene.fmqm
@@ -94,7 +88,7 @@ class FMQM_OT_clear_results(bpy.types.Operator):  # noqa: N801
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return has_rows(cls, context)
+        return allowed(cls, no_rows(context))
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         context.scene.fmqm.rows.clear()
@@ -111,7 +105,7 @@ class FMQM_OT_copy_results(bpy.types.Operator):  # noqa: N801
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return has_rows(cls, context)
+        return allowed(cls, no_rows(context))
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         rows = [row for row in context.scene.fmqm.rows if is_whole(row)]

@@ -16,7 +16,8 @@ from ...report.npz import save_fields
 from ...report.records import csv_text, json_text
 from .. import session, stored_text
 from ..properties.rows import active_row, is_whole, pair_of
-from .results import broken_text, has_rows
+from .polls import allowed, no_rows
+from .results import broken_text
 
 
 class FMQM_OT_save_results(bpy.types.Operator):  # noqa: N801
@@ -45,7 +46,7 @@ class FMQM_OT_save_results(bpy.types.Operator):  # noqa: N801
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return has_rows(cls, context)
+        return allowed(cls, no_rows(context))
 
     def invoke(self, context: bpy.types.Context, _: bpy.types.Event) -> set[str]:
         folder = os.path.dirname(bpy.data.filepath) or os.path.expanduser("~")

@@ -21,6 +21,7 @@ from .. import session, stale
 from ..modal import SteppedOperator
 from ..properties.rows import FMQMRow, active_row, row_targets
 from ..properties.settings import pair_options, patterns_of
+from .polls import allowed
 
 _READING = 0.1  # share of the whole that reading the scene takes, about
 
@@ -36,14 +37,8 @@ class FMQM_OT_screen_sizes(SteppedOperator, bpy.types.Operator):  # noqa: N801
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        reason = ""
-        if session.job is not None:
-            reason = "A measurement is running"
-        elif not _rows(context.scene):
-            reason = "Measure the quality first, and choose a result"
-        if reason:
-            cls.poll_message_set(reason)
-        return not reason
+        why = "" if _rows(context.scene) else "Measure the quality first, and choose a result"
+        return allowed(cls, why if session.job is None else "A measurement is running")
 
     def begin(self, context: bpy.types.Context) -> bool:
         settings = context.scene.fmqm.settings

@@ -11,16 +11,7 @@ from bpy.props import IntProperty
 from ...metric.errors import FMQMError
 from ..view import heat, kept, shells, shown, slice_plane, units, worst
 from ..view.result import look_of, measured_row
-
-
-def has_samples(cls: type, context: bpy.types.Context) -> bool:
-    try:
-        measured_row(context.scene)
-    except FMQMError as reason:
-        text = str(reason)
-        cls.poll_message_set(text[:1].upper() + text[1:])  # type: ignore[attr-defined]
-        return False
-    return True
+from .polls import allowed, no_samples
 
 
 class ShowOperator:
@@ -30,7 +21,7 @@ class ShowOperator:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return has_samples(cls, context)
+        return allowed(cls, no_samples(context))
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         try:
@@ -54,10 +45,8 @@ class FMQM_OT_keep(ShowOperator, bpy.types.Operator):  # noqa: N801 Blender's na
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if look_of(context.scene).show == heat.OFF:
-            cls.poll_message_set("Choose Surface or Points first")
-            return False
-        return has_samples(cls, context)
+        is_off = look_of(context.scene).show == heat.OFF
+        return allowed(cls, "Choose Surface or Points first" if is_off else no_samples(context))
 
     def act(self, context: bpy.types.Context) -> None:
         kept.keep_as_objects(context.scene)
@@ -92,10 +81,7 @@ class FMQM_OT_worst_all(bpy.types.Operator):  # noqa: N801
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not look_of(context.scene).focused:
-            cls.poll_message_set("All patches are shown")
-            return False
-        return True
+        return allowed(cls, "" if look_of(context.scene).focused else "All patches are shown")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         worst.show_all_patches(context.scene)
@@ -145,10 +131,7 @@ class FMQM_OT_clear(bpy.types.Operator):  # noqa: N801
 
     @classmethod
     def poll(cls, _: bpy.types.Context) -> bool:
-        if not shown.anything():
-            cls.poll_message_set("Nothing is shown")
-            return False
-        return True
+        return allowed(cls, "" if shown.anything() else "Nothing is shown")
 
     def execute(self, _: bpy.types.Context) -> set[str]:
         shown.clear()

@@ -25,24 +25,18 @@ from ..properties.rows import (
     row_stderr,
     settings_name,
 )
-from .sidebar import Sidebar, wrapped
+from .sidebar import OfResult, wrapped
 
 _SHORT_SPACE = {SPACE_LABELS["location"]: "Origins Aligned"}
 NOT_SEEN = "Normal maps, roughness and lighting are not part of FMQM"
 
 
-class FMQM_PT_details(Sidebar, bpy.types.Panel):  # noqa: N801
+class FMQM_PT_details(OfResult, bpy.types.Panel):  # noqa: N801
     bl_idname = "FMQM_PT_details"
-    bl_parent_id = "FMQM_PT_main"
     bl_label = "Details"
     bl_description = "All numbers of the chosen result, and how far to trust it"
     bl_options: ClassVar = {"DEFAULT_CLOSED"}
     bl_order = 4
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        row = active_row(context.scene)
-        return row is not None and row_scores(row) is not None
 
     def draw(self, context: bpy.types.Context) -> None:
         row = active_row(context.scene)

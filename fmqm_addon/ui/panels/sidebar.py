@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import bpy
 
+from ..properties.rows import active_row, row_scores
+
 CHARACTER = 6.6  # pixels at scale 1, of the panel's font, about
 
 
@@ -12,6 +14,17 @@ class Sidebar:
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "FMQM"
+
+
+class OfResult(Sidebar):
+    """A panel that is absent where the chosen row has nothing to show."""
+
+    bl_parent_id = "FMQM_PT_main"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        row = active_row(context.scene)
+        return row is not None and row_scores(row) is not None
 
 
 def wrapped(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "NONE") -> None:

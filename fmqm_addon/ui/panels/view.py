@@ -19,11 +19,9 @@ from ..operators.view import (
     FMQM_OT_worst_all,
     FMQM_OT_worst_step,
 )
-from ..properties.rows import active_row, row_scores
+from ..properties.rows import active_row
 from ..view.result import look_of
-from .sidebar import Sidebar
-
-PARENT = "FMQM_PT_main"
+from .sidebar import OfResult
 
 
 class FMQM_UL_worst(bpy.types.UIList):  # noqa: N801
@@ -40,15 +38,10 @@ class FMQM_UL_worst(bpy.types.UIList):  # noqa: N801
         """Twenty rows in their order need no filter."""
 
 
-class FMQM_PT_look(Sidebar, bpy.types.Panel):  # noqa: N801
-    bl_parent_id = PARENT
+class FMQM_PT_look(OfResult, bpy.types.Panel):  # noqa: N801
     bl_idname = "FMQM_PT_look"
     bl_label = "Heat Map"
     bl_order = 2
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return has_result(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, look = self.layout, look_of(context.scene)
@@ -81,15 +74,10 @@ class FMQM_PT_look(Sidebar, bpy.types.Panel):  # noqa: N801
         row.operator(FMQM_OT_clear.bl_idname, icon="TRASH")
 
 
-class FMQM_PT_worst(Sidebar, bpy.types.Panel):  # noqa: N801
-    bl_parent_id = PARENT
+class FMQM_PT_worst(OfResult, bpy.types.Panel):  # noqa: N801
     bl_idname = "FMQM_PT_worst"
     bl_label = "Worst Places"
     bl_order = 3
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return has_result(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, look = self.layout, look_of(context.scene)
@@ -101,16 +89,11 @@ class FMQM_PT_worst(Sidebar, bpy.types.Panel):  # noqa: N801
         layout.operator(FMQM_OT_worst_all.bl_idname)
 
 
-class FMQM_PT_ncf(Sidebar, bpy.types.Panel):  # noqa: N801
-    bl_parent_id = PARENT
+class FMQM_PT_ncf(OfResult, bpy.types.Panel):  # noqa: N801
     bl_idname = "FMQM_PT_ncf"
     bl_label = "NCF Debugging"
     bl_order = 6
     bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return has_result(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, look = self.layout, look_of(context.scene)
@@ -133,12 +116,6 @@ class FMQM_PT_ncf(Sidebar, bpy.types.Panel):  # noqa: N801
         column.prop(look, "shell_distance")
         column.prop(look, "shell_points")
         column.operator(FMQM_OT_shells.bl_idname, icon="MOD_THICKNESS")
-
-
-def has_result(context: bpy.types.Context) -> bool:
-    """Whether the chosen row has something to show; panels that have not are absent."""
-    row = active_row(context.scene)
-    return row is not None and row_scores(row) is not None
 
 
 def _switch(layout: bpy.types.UILayout, look: Any, name: str) -> None:
