@@ -16,6 +16,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
+from ..apart import check_apart
 from ..batch.interrupt import defer_interrupts
 from ..batch.progress_log import Log
 from ..batch.scorer import REMEDIES
@@ -125,26 +126,29 @@ def _search(args: argparse.Namespace, targets: list[float], settings: Settings, 
     prepare_bpy()
     from ..blender.files.export import (
         check_ending,
-        check_outputs,
         file_reader,
+        files_read,
         save_version,
         texture_sizes,
         written_reader,
     )
     from ..blender.scene.node_queries import surface_query
     from ..comparison.decimation import DecimationGoal, decimating
-    from ..report.atomic_files import check_writable, print_parts, write_text
+    from ..report.atomic_files import STDOUT, check_writable, print_parts, write_text
 
     judge = args.judge or Judge.FMQM
     outputs = _output_names(args.output, targets if args.chain else [])
     for path in outputs:
         check_ending(path)
-    files = [*outputs, *([args.json] if args.json and args.json != "-" else [])]
-    for path in files:
-        check_writable(path)
+    files = [*(("-o", path) for path in outputs), *([("--json", args.json)] if args.json else [])]
+    for _, path in files:
+        if path != STDOUT:
+            check_writable(path)
     reading = Reading(access=Access(args.untrusted, args.asset_root or ""))
     if files:
-        check_outputs(args.reference, files, reading)
+        named = [Path(path).with_suffix(".mtl") for path in outputs if path.lower().endswith(".obj")]
+        beside = [("-o (its materials)", str(path)) for path in named]
+        check_apart([*files, *beside], files_read(args.reference, reading))
     with defer_interrupts():
         sizes = () if args.target_texture is None else tuple(texture_sizes(args.reference, reading))
     goal = DecimationGoal(tuple(targets), args.max_triangles, args.target_texture, sizes, judge)
@@ -171,9 +175,9 @@ def _search(args: argparse.Namespace, targets: list[float], settings: Settings, 
             except FMQMError as error:
                 errors.append(str(error))
     document = _json_text(args.reference, judge, settings, result, saved)
-    if args.json and args.json != "-":
+    if args.json and args.json != STDOUT:
         write_text(args.json, document)
-    print_parts(out, [document if args.json == "-" else _table(result, saved)])
+    print_parts(out, [document if args.json == STDOUT else _table(result, saved)])
     for line in (*(f"warning: {warning}" for warning in warnings), *errors):
         log.say(line)
     return FAILED if errors else OK

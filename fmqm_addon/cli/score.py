@@ -16,6 +16,7 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from typing import Any, TextIO
 
+from ..apart import check_apart
 from ..batch.interrupt import defer_interrupts
 from ..batch.journal import Journal, Records, row_key
 from ..batch.manifest import glob_files, lod_rows, plain_rows, read_manifest
@@ -28,7 +29,7 @@ from ..comparison.judge import Judge
 from ..folders import TEMPORARY, own_folder, sweep
 from ..metric.errors import FileError, FMQMError, SettingsError
 from ..provenance import provenance
-from ..report.atomic_files import STDOUT, check_apart, check_writable
+from ..report.atomic_files import STDOUT, check_writable
 from .process import (
     FAILED,
     OK,
@@ -78,9 +79,9 @@ def main(argv: Sequence[str], out: TextIO, program: str = PROGRAM) -> int:
         rows = _rows(args, options)
         outputs = output_files(args)
         named = [path for row in rows or () for path in row.files()]
-        check_apart(outputs | page_file(args), [*named, args.manifest or "", *(args.merge or ())])
+        check_apart((outputs | page_file(args)).items(), [*named, args.manifest or "", *(args.merge or ())])
         for path in outputs.values():
-            if path and path != STDOUT:
+            if path != STDOUT:
                 check_writable(path)
         if args.report:
             from ..report.html.pictures import open_report_folder

@@ -256,16 +256,16 @@ def shard_of(text: str) -> tuple[int, int]:
     return int(first), int(count)
 
 
-def output_files(args: argparse.Namespace) -> dict[str, str | None]:
+def output_files(args: argparse.Namespace) -> dict[str, str]:
     """Files that are written, by flag, the report aside."""
-    names = ("json", "csv", "junit", "save_fields", "picture")
+    named = {flag_of(name): getattr(args, name) for name in ("json", "csv", "junit", "save_fields", "picture")}
     journal = None if args.merge else journal_path(args)
-    return {flag_of(name): getattr(args, name) for name in names} | {"--journal": journal}
+    return {flag: path for flag, path in (named | {"--journal": journal}).items() if path}
 
 
-def page_file(args: argparse.Namespace) -> dict[str, str | None]:
+def page_file(args: argparse.Namespace) -> dict[str, str]:
     if not args.report:
-        return {"--report": None}
+        return {}
     from ..report.html.page import PAGE
 
     return {"--report": os.path.join(args.report, PAGE)}

@@ -8,9 +8,10 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, TextIO
 
+from ..apart import check_apart
 from ..batch.progress_log import Log
 from ..comparison.judge import Judge
-from ..report.atomic_files import STDOUT, check_apart, print_parts, write_parts
+from ..report.atomic_files import STDOUT, print_parts, write_parts
 from ..report.criteria import below, shortfall
 from ..report.explain import explain, footnote
 from ..report.parts_table import parts_parts
@@ -42,7 +43,7 @@ def write_outputs(
 
         texts.append((args.junit, junit_parts(records)))
     try:
-        check_apart(output_files(args) | page_file(args), _images(records))
+        check_apart((output_files(args) | page_file(args)).items(), _images(records))
         for path, parts in texts:
             if path and path != STDOUT:
                 write_parts(path, parts)

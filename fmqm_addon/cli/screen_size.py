@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, TextIO, TypeVar
 
+from ..apart import check_apart
 from ..batch.interrupt import defer_interrupts
 from ..batch.progress_log import Log
 from ..batch.scorer import REMEDIES
@@ -22,7 +23,7 @@ from ..comparison.alignment import align
 from ..comparison.pair import PairOptions
 from ..metric.errors import FMQMError, SettingsError
 from ..metric.stepper import Stepper
-from ..report.atomic_files import STDOUT, check_apart, check_writable, print_parts, write_text
+from ..report.atomic_files import STDOUT, check_writable, print_parts, write_text
 from ..screen_size.definition import VIEW_CHOICES, VIEWS
 from ..screen_size.engines import ENGINES, SCREEN_NAMES, Extent, Screen, chain, numbers, pasteable
 from ..screen_size.measure import ScreenSize, ScreenSizes
@@ -89,7 +90,7 @@ def main(argv: Sequence[str], out: TextIO, program: str = PROGRAM) -> int:
         screen = Screen(**given)
         reading = Reading(bake=args.bake, access=Access(args.untrusted, args.asset_root or ""), normals=True)
         if args.json and args.json != STDOUT:
-            check_apart({"--json": args.json}, [args.reference, *args.lods])
+            check_apart([("--json", args.json)], [args.reference, *args.lods])
             check_writable(args.json)
         return _measure(args, screen, reading, log, out)
     except SettingsError as error:

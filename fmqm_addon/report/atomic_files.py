@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writing files whole or not at all, never in the place of what is read; and to standard output."""
+"""Writing files whole or not at all, and to standard output."""
 
 from __future__ import annotations
 
 import errno
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TextIO
 
 from ..folders import own_folder, take_place
-from ..metric.errors import FileError, SettingsError
+from ..metric.errors import FileError
 
 STDOUT = "-"  # in the place of a path
 
@@ -66,32 +66,6 @@ def print_parts(stream: TextIO, parts: Iterable[str]) -> None:
         os.close(nowhere)
         if error.errno not in (errno.EPIPE, errno.EBADF):
             raise FileError(f"the output cannot be printed ({error.strerror or error})") from error
-
-
-def check_apart(outputs: Mapping[str, str | None], inputs: Iterable[str]) -> None:
-    """Refuses outputs that would replace inputs or each other, by whatever names and links.
-
-    Args:
-        outputs: paths by the flags that name them; STDOUT and None are no files.
-
-    Raises:
-        SettingsError: they do; the text names the flags.
-    """
-    places = {flag: path if path == STDOUT else _place(path) for flag, path in outputs.items() if path}
-    flags: dict[str, str] = {}
-    for flag, place in places.items():
-        if flags.setdefault(place, flag) != flag:
-            raise SettingsError(f"{flags[place]} and {flag} both write to {outputs[flag]}; name two files")
-    for place in map(_place, inputs):
-        if place in flags:
-            raise SettingsError(f"{flags[place]} {outputs[flags[place]]}: this file is an input; name another")
-
-
-def _place(path: str) -> str:
-    try:
-        return os.path.normcase(os.path.realpath(path))
-    except ValueError:  # no path on this system, which others say
-        return path
 
 
 def check_writable(path: str) -> None:

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from fmqm_addon.apart import check_apart
 from fmqm_addon.metric.errors import FileError, SettingsError
-from fmqm_addon.report.atomic_files import check_apart, check_writable, write_text
+from fmqm_addon.report.atomic_files import check_writable, write_text
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
@@ -40,14 +41,18 @@ def test_outputs_are_kept_apart_from_inputs_and_each_other(tmp_path: Path) -> No
     (tmp_path / "folder").mkdir()
     (tmp_path / "link").symlink_to(tmp_path / "model.obj")
     path = str(tmp_path / "model.obj")
-    check_apart({"--json": "-", "--csv": f"{path}.csv", "--junit": None}, [path, "", "a\0b"])
+    check_apart([("--json", "-"), ("--csv", f"{path}.csv")], [path, "", "a\0b"])
     for name in ("model.obj", "./folder/../model.obj", "link"):
-        with pytest.raises(SettingsError, match=r"^--csv .*: this file is an input"):
-            check_apart({"--json": "-", "--csv": f"{tmp_path}/{name}"}, ["", path])
+        with pytest.raises(SettingsError, match=r"^--csv .*: it would replace .*, which is an input"):
+            check_apart([("--json", "-"), ("--csv", f"{tmp_path}/{name}")], ["", path])
         with pytest.raises(SettingsError, match=r"^--json and --csv both write to"):
-            check_apart({"--json": path, "--csv": f"{tmp_path}/{name}"}, [])
+            check_apart([("--json", path), ("--csv", f"{tmp_path}/{name}")], [])
     with pytest.raises(SettingsError, match="both write to -"):
-        check_apart({"--json": "-", "--csv": "-"}, [])
+        check_apart([("--json", "-"), ("--csv", "-")], [])
+    Path(path).touch()
+    os.link(path, tmp_path / "other.obj")
+    with pytest.raises(FileError, match="other.obj: it would replace"):
+        check_apart([("-o", str(tmp_path / "other.obj"))], [path], FileError)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="modes are POSIX's")

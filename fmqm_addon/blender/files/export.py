@@ -12,9 +12,10 @@ from pathlib import Path
 
 import bpy
 
+from ...apart import check_apart
 from ...comparison.decimation import Version, VersionReader
 from ...folders import own_folder, take_place
-from ...metric.errors import FileError, FMQMError, MeshError, SettingsError
+from ...metric.errors import FileError, MeshError, SettingsError
 from ...metric.surface import MeshArrays
 from ..materials.types import Reading
 from ..scene.decimate import add_modifiers, scene_reader
@@ -118,28 +119,21 @@ def save_version(spec: str, version: Version, path: str, reading: Reading = AS_F
         written = [file for file in folder.rglob("*") if file.is_file()]
         written.sort(key=lambda file: file.name == target.name)  # the one that names the others is moved last
         places = [target.parent / file.relative_to(folder) for file in written]
-        for place in places:
-            _refuse_input(path, str(place), inputs, FileError)
+        check_apart([(f"{path} writes", str(place)) for place in places], inputs, FileError)
         for file, place in zip(written, places, strict=True):
             place.parent.mkdir(exist_ok=True)
             take_place(file, place)
     return warnings
 
 
-def check_outputs(spec: str, paths: Sequence[str], reading: Reading = AS_FOUND) -> None:
-    """Refuses outputs that would replace what the asset is read from; opens the file.
+def files_read(spec: str, reading: Reading = AS_FOUND) -> list[str]:
+    """The file of an asset, and the images and material files that it names; opens it.
 
     Raises:
-        SettingsError: one is the file, an image or a material file that it names, or another of the outputs.
         FileError, MeshError: as open_asset.
     """
     open_asset(spec, reading)
-    inputs = _inputs(spec)
-    for index, path in enumerate(paths):
-        for place in (path, str(Path(path).with_suffix(".mtl"))) if path.lower().endswith(".obj") else (path,):
-            _refuse_input(path, place, inputs, SettingsError)
-        if os.path.realpath(path) in map(os.path.realpath, paths[:index]):
-            raise SettingsError(f"{path}: it is named for two outputs; name another file")
+    return _inputs(spec)
 
 
 def check_ending(path: str) -> str:
@@ -232,14 +226,6 @@ def _inputs(spec: str) -> list[str]:
         names = [*(os.fsdecode(name.strip(b'"')) for name in named), f"{Path(path).stem}.mtl"]  # read even if not named
         files += [os.path.join(os.path.dirname(path), name) for name in names]
     return [file for file in files if os.path.exists(file)]
-
-
-def _refuse_input(path: str, place: str, inputs: Sequence[str], error: type[FMQMError]) -> None:
-    """An output that goes to this place must leave the inputs alone, whatever links and letter case their paths use."""
-    same = [file for file in inputs if os.path.exists(place) and os.path.samefile(file, place)]
-    if same:
-        replaces = "" if place == path else f"with {os.path.basename(place)} "
-        raise error(f"{path}: {replaces}it would replace {same[0]}, which is an input; name another file")
 
 
 def _moves(object_: bpy.types.Object) -> bool:
