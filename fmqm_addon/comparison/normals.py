@@ -11,47 +11,58 @@ from ..metric.surface import Surface, triangle_normals
 SMOOTH_ANGLE = 60.0  # degrees; where a mesh has no normals, they are smoothed over edges that are less sharp
 
 
-def corner_normals(surface: Surface, smooth_angle: float = SMOOTH_ANGLE) -> Floats:
+def corner_normals(surface: Surface, smooth_angle: float = SMOOTH_ANGLE, faces: Ints | None = None) -> Floats:
     """(T, 3, 3) float64 unit normals: the surface's own; smoothed at corners where it has none.
 
     Args:
         smooth_angle: degrees; edges that are at least as sharp stay so.
+        faces: (F,) rows of the triangles that are asked for, and the result's rows; None: all.
     """
-    given = surface.normals
-    if given is None:
-        return smoothed_normals(surface, smooth_angle)
+    if surface.normals is None:
+        return smoothed_normals(surface, smooth_angle, faces)
+    given = surface.normals if faces is None else surface.normals[faces]
     length = np.linalg.norm(given, axis=2, keepdims=True)
     known = np.isfinite(length) & (length > 0)
     if known.all():
         return given / length
-    return np.where(known, given / np.where(known, length, 1), smoothed_normals(surface, smooth_angle))
+    return np.where(known, given / np.where(known, length, 1), smoothed_normals(surface, smooth_angle, faces))
 
 
-def smoothed_normals(surface: Surface, smooth_angle: float = SMOOTH_ANGLE) -> Floats:
+def smoothed_normals(surface: Surface, smooth_angle: float = SMOOTH_ANGLE, faces: Ints | None = None) -> Floats:
     """(T, 3, 3) float64 unit normals: at each corner, the mean of the faces around it up to the next sharp edges.
 
-    Faces count by their area: what a decimated mesh shows of a shape lies in its large faces.
+    Faces count by their area: what a decimated mesh shows of a shape lies in its large faces. Those that do not touch
+    the faces asked for change nothing, and cost nothing.
     """
-    corners = surface.vertices[surface.triangles]
+    if faces is None:
+        return _smoothed(surface.vertices, surface.triangles, smooth_angle)
+    touched = np.zeros(len(surface.vertices), bool)
+    touched[surface.triangles[faces]] = True
+    around = np.flatnonzero(touched[surface.triangles].any(axis=1))
+    return _smoothed(surface.vertices, surface.triangles[around], smooth_angle)[np.searchsorted(around, faces)]
+
+
+def _smoothed(vertices: Floats, triangles: Ints, smooth_angle: float) -> Floats:
+    corners = vertices[triangles]
     weighted = np.repeat(cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), 3, axis=0)
-    flat = triangle_normals(surface.vertices, surface.triangles)
-    fan = _fans(surface, flat, float(np.cos(np.radians(smooth_angle))))
+    flat = triangle_normals(vertices, triangles)
+    fan = _fans(triangles, flat, float(np.cos(np.radians(smooth_angle))))
     total = np.stack([np.bincount(fan, column, len(fan)) for column in weighted.T], axis=1)[fan]
     length = np.linalg.norm(total, axis=1, keepdims=True)
     smooth = np.where(length > 0, total / np.where(length > 0, length, 1), np.repeat(flat, 3, axis=0))
     return smooth.reshape(-1, 3, 3)
 
 
-def _fans(surface: Surface, flat: Floats, sharp: float) -> Ints:
+def _fans(triangles: Ints, flat: Floats, sharp: float) -> Ints:
     """(3 T,) a number for each corner, the same for those at one vertex that edges join which are not sharp:
     whose faces' normals have at least this cosine."""
     corner = np.arange(3 * len(flat)).reshape(-1, 3)
     # Each edge of each triangle, with the corners at its two ends: at the lower vertex first.
-    starts, ends = surface.triangles.ravel(), np.roll(surface.triangles, -1, axis=1).ravel()
+    starts, ends = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
     at_start, at_end = corner.ravel(), np.roll(corner, -1, axis=1).ravel()
     low, high = np.minimum(starts, ends), np.maximum(starts, ends)
     at_low, at_high = np.where(starts < ends, at_start, at_end), np.where(starts < ends, at_end, at_start)
-    order = np.argsort(low * len(surface.vertices) + high, kind="stable")
+    order = np.argsort(low * (int(triangles.max(initial=0)) + 1) + high, kind="stable")
     one, other = order[:-1], order[1:]
     joined = (low[one] == low[other]) & (high[one] == high[other])
     joined &= dot(flat[one // 3], flat[other // 3]) >= sharp

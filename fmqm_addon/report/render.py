@@ -93,6 +93,11 @@ class Camera:
         axes = _view_axes(AZIMUTH, ELEVATION)
         if normal.any():
             axes = np.stack([*plane_axes(normal), -normal])
+        return cls.close_up(center, axes, width)
+
+    @classmethod
+    def close_up(cls, center: Floats, axes: Floats, width: float) -> Camera:
+        """The camera that looks along its axes at a place, as facing() does."""
         half = float(np.tan(np.radians(FIELD_OF_VIEW / 2)))
         distance = width / 2 / half
         return cls(center - distance * axes[2], axes, (half, half), max(distance - width, 0.0))
@@ -155,9 +160,7 @@ def rendering(
     hits: Ints | None = None,
     normals: Floats | None = None,
 ) -> Work[Pixels]:
-    """render() in steps of some milliseconds, but for smoothing normals that are not given."""
-    if normals is None:
-        normals = corner_normals(surface)
+    """render() in steps of some milliseconds; normals that are not given are smoothed where they are seen."""
     columns, rows = _pixel_centers(size)
     casting = _casting(surface, camera, size, columns, rows, normals, face_color, hits)
     image = yield from as_part(casting, 0.0, 0.6)
@@ -221,7 +224,7 @@ def _casting(
     size: tuple[int, int],
     columns: Floats,
     rows: Floats,
-    normals: Floats,
+    normals: Floats | None,
     face_color: Floats | None,
     hits: Ints | None = None,
 ) -> Work[Floats]:
@@ -236,7 +239,12 @@ def _casting(
 
 
 def _ray_colors(
-    surface: Surface, camera: Camera, directions: Floats, triangle: Ints, normals: Floats, face_color: Floats | None
+    surface: Surface,
+    camera: Camera,
+    directions: Floats,
+    triangle: Ints,
+    normals: Floats | None,
+    face_color: Floats | None,
 ) -> Floats:
     """(N, 3) encoded colors in [0, 1] of rays from the camera that end on the (N,) triangles; -1: BACKGROUND."""
     colors = np.empty((len(directions), 3))
@@ -248,7 +256,7 @@ def _ray_colors(
     slope = dot(flat, directions)
     distance = dot(a - camera.eye, flat) / np.where(np.abs(slope) < 1e-12, 1e-12, slope)
     barycentric = closest_on_triangles(camera.eye + distance[:, None] * directions, a, b, c)[1]
-    smooth = np.einsum("nk,nkc->nc", barycentric, normals[triangle])
+    smooth = np.einsum("nk,nkc->nc", barycentric, _normals_of(surface, triangle, normals))
     # Towards the camera, whichever side of the face that is; normals that stand on the other side than the order of
     # the corners say which side is meant.
     smooth *= (-np.sign(slope) * np.where(dot(flat, smooth) < 0, -1, 1))[:, None]
@@ -261,6 +269,14 @@ def _ray_colors(
         seen, ambient = surface.color_at(triangle, barycentric), AMBIENT
     colors[hit] = np.clip(seen, 0, 1) * (ambient + (1 - ambient) * lit)[:, None]
     return colors
+
+
+def _normals_of(surface: Surface, triangle: Ints, normals: Floats | None) -> Floats:
+    """(N, 3, 3) unit normals at the corners of (N,) triangles, out of those of all where these are there."""
+    if normals is not None:
+        return normals[triangle]
+    faces, which = np.unique(triangle, return_inverse=True)
+    return corner_normals(surface, faces=faces)[which]
 
 
 def _differs(image: Floats) -> NDArray[np.bool_]:

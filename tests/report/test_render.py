@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 
 from fmqm_addon.blender.scene.bvh import BVHQuery
+from fmqm_addon.comparison.normals import corner_normals
 from fmqm_addon.metric.colorspace import srgb_to_lab
 from fmqm_addon.metric.errors import FileError, FMQMError
 from fmqm_addon.metric.evaluation import COLUMNS, Evaluation, Result
 from fmqm_addon.metric.settings import Settings
+from fmqm_addon.metric.stepper import Stepper
 from fmqm_addon.metric.surface import Frame, MeshArrays, Surface, prepare_surface
 from fmqm_addon.metric.texture import Material, PlainColor, Texture
 from fmqm_addon.report import render as rendering
@@ -22,7 +24,7 @@ from fmqm_addon.report.labels import shorten
 from fmqm_addon.report.render import Camera, render, score_by_face
 from fmqm_addon.report.sheet import write_picture
 from fmqm_addon.report.visual.colormap import NO_PATCH, score_colors
-from tests.metric.meshes import cube, sphere, surface
+from tests.metric.meshes import cube, sphere, surface, texture
 
 RED, GREEN, BLUE, YELLOW = (200, 20, 20), (20, 200, 20), (20, 20, 200), (200, 200, 20)
 FRONT = {"azimuth": 0.0, "elevation": 0.0}
@@ -71,6 +73,19 @@ def test_colors_stand_where_the_texture_says() -> None:
     assert (image[0] == rendering.BACKGROUND).all() and (image[:, -1] == rendering.BACKGROUND).all()
     middle = image[30, 31]  # between yellow and green: the same red in both, or a mixture
     assert middle[1] > 100
+
+
+def test_steps_and_shared_hits_and_normals_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    ball = surface(sphere(), (texture(),))
+    camera, size = Camera.close_up(np.zeros(3), Camera.framing(ball).axes, 1.5), (40, 30)
+    whole = render(ball, camera, size)
+    hits, normals = rendering.pixel_hits(ball, camera, size), corner_normals(ball)
+    assert np.array_equal(render(ball, camera, size, None, hits, normals), whole)
+    monkeypatch.setattr(rendering, "BATCH", 97)
+    stepper = Stepper(rendering.rendering(ball, camera, size))
+    done = [stepper.progress.done for _ in iter(stepper.step, False)]
+    assert len(done) > 1200 // 97 and done == sorted(done) and done[-1] == 1
+    assert np.array_equal(stepper.result, whole)
 
 
 def test_both_sides_of_a_face_are_drawn() -> None:

@@ -93,6 +93,16 @@ def test_normals_are_smooth_over_blunt_edges_only() -> None:
     assert np.allclose(np.abs(flat).max(axis=2), 1), "edges of 90 degrees stay sharp"
 
 
+def test_normals_of_some_faces_are_those_among_all() -> None:
+    for shape in (sphere(), cube(3)):
+        mesh, faces = surface(shape), np.array([40, 3, 17, 3])
+        assert np.array_equal(corner_normals(mesh, faces=faces), corner_normals(mesh)[faces])
+        own = replace(mesh, normals=np.zeros((len(mesh.triangles), 3, 3)) + [0, 0, 1])
+        own.normals[3] = 0
+        assert np.array_equal(corner_normals(own, faces=faces), corner_normals(own)[faces])
+    assert corner_normals(mesh, faces=faces[:0]).shape == (0, 3, 3)
+
+
 def test_own_normals_come_first_and_holes_in_them_are_smoothed() -> None:
     ball = surface(sphere())
     own = np.zeros((len(ball.triangles), 3, 3))
