@@ -2,7 +2,7 @@
 """Score textured meshes against a reference.
 
 fmqm score REFERENCE DISTORTED [DISTORTED ...]
-fmqm score --manifest FILE | REFERENCE --glob PATTERN | --lods FILE
+fmqm score --manifest FILE | REFERENCE --glob PATTERN | --lods FILE | --dataset NAME DIR
 python scripts/score.py REFERENCE DISTORTED [DISTORTED ...]
 blender -b -q --python scripts/score.py -- REFERENCE DISTORTED [DISTORTED ...]
 """
@@ -17,6 +17,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, TextIO
 
 from ..apart import check_apart
+from ..batch.datasets import layout_of, read_dataset
 from ..batch.interrupt import defer_interrupts
 from ..batch.journal import Journal, Records, row_key
 from ..batch.manifest import glob_files, lod_rows, plain_rows, read_manifest
@@ -27,7 +28,7 @@ from ..batch.scorer import score_shard, score_tasks, units_of
 from ..batch.workers import WORKER, Limits, recover_scores, score_with_workers, workers_command
 from ..comparison.judge import Judge
 from ..folders import TEMPORARY, own_folder, sweep
-from ..metric.errors import FileError, FMQMError, SettingsError
+from ..metric.errors import FileError, FMQMError, SettingsError, one_line
 from ..provenance import provenance
 from ..report.atomic_files import STDOUT, check_writable
 from .process import (
@@ -110,6 +111,8 @@ def _rows(args: argparse.Namespace, options: BatchOptions) -> list[Row] | None:
     """The pairs that the arguments name; None for none, which only a merge knows."""
     if args.manifest:
         rows = read_manifest(args.manifest, options.pair.settings)
+    elif args.dataset:
+        rows = _dataset_rows(args)
     elif args.lods:
         prepare_bpy()
         with defer_interrupts():
@@ -174,9 +177,20 @@ def _score(
     records = Records(rows, keys, journal, criteria_of(args))
     write_outputs(args, records, options.as_dict(), versions, last, out)
     code = exit_code(records)
-    batch = args.manifest or args.glob or args.lods or args.jobs or args.dask or args.journal or args.resume
+    named = args.manifest or args.dataset or args.glob or args.lods
+    batch = named or args.jobs or args.dask or args.journal or args.resume
     journal.close() if batch else journal.remove()
     return code
+
+
+def _dataset_rows(args: argparse.Namespace) -> list[Row]:
+    """The pairs of a data set; tells the names in its table that have no files."""
+    name, folder = args.dataset
+    found = read_dataset(folder, layout_of(name, args.layout))
+    if found.missing:
+        print_stderr(f"{len(found.missing)} of {len(found.rows) + len(found.missing)} names have no files here:\n")
+        print_stderr("".join(f"  {one_line(each)}\n" for each in found.missing))
+    return list(found.rows)
 
 
 def _has_pictures(folder: str, record: Mapping[str, Any], judge: Judge) -> bool:

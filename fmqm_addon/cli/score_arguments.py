@@ -8,6 +8,7 @@ import hashlib
 import os
 from dataclasses import fields
 
+from ..batch.datasets import LAYOUTS
 from ..batch.rows import BatchOptions
 from ..batch.workers import Limits
 from ..blender.access import Access
@@ -50,6 +51,11 @@ def build_parser(program: str) -> OneLineParser:
         help="pairs from a .csv with a header, or a .json list of objects: reference, distorted, and if wanted id, "
         "ref_texture, texture, fail_under and any setting",
     )  # fmt: skip
+    batch.add_argument(
+        "--dataset", nargs=2, metavar=("NAME", "DIR"),
+        help=f"score a data set of the paper that lies in DIR: {', '.join(LAYOUTS)}; evaluate.py judges the scores",
+    )  # fmt: skip
+    batch.add_argument("--layout", metavar="FILE", help="a JSON object that changes how --dataset is laid out")
     batch.add_argument("--glob", metavar="PATTERN", help="score the files that match against REFERENCE")
     batch.add_argument(
         "--lods", metavar="FILE", help="score each level of the file's LOD chains against level 0 and the level before"
@@ -236,12 +242,14 @@ def criteria_of(args: argparse.Namespace) -> Criteria:
 
 def _check_sources(args: argparse.Namespace) -> None:
     """One way of naming pairs."""
-    given = [flag for flag in ("manifest", "glob", "lods") if getattr(args, flag)]
+    given = [flag for flag in ("manifest", "glob", "lods", "dataset") if getattr(args, flag)]
+    if args.layout and not args.dataset:
+        raise SettingsError("--layout is for --dataset; give both")
     if len(given) > 1 or (given and args.distorted):
         raise SettingsError(f"{flag_of(given[0])} names pairs already; leave out {flag_of(given[1:]) or 'DISTORTED'}")
     if args.reference and given not in ([], ["glob"]):
         raise SettingsError(f"{flag_of(given[0])} names references itself; leave out {args.reference}")
-    if given in (["manifest"], ["lods"]) and (args.texture or args.ref_texture):
+    if given in (["manifest"], ["lods"], ["dataset"]) and (args.texture or args.ref_texture):
         raise SettingsError(f"--texture and --ref-texture do not go with {flag_of(given[0])}; name them in a manifest")
     if not args.merge and not args.worker and given in ([], ["glob"]):
         missing = "REFERENCE" if not args.reference else "" if given or args.distorted else "DISTORTED"
