@@ -88,8 +88,8 @@ def _evaluate(args: argparse.Namespace, out: TextIO) -> int:
         raise FMQMError(f"this Python has no {error.name}: pip install 'fmqm[evidence]'") from error
     layout = layout_of(args.dataset[0], args.layout) if args.dataset else None
     table = args.mos if layout is None else opinion_file(args.dataset[1], layout)
-    outputs = {"--json": args.json, "--csv": args.csv}
-    check_apart(outputs, [args.scores, table])
+    outputs = {flag: path for flag, path in (("--json", args.json), ("--csv", args.csv)) if path}
+    check_apart(outputs.items(), [args.scores, table])
     for path in outputs.values():
         if path and path != STDOUT:
             check_writable(path)

@@ -53,7 +53,7 @@ def test_each_flag_reaches_the_pair() -> None:
 
 def test_reading_and_outputs() -> None:
     found = options("--bake", "64", "--max-image-side", "9", "--untrusted", "--explain", "--report", "web")
-    reading = Reading(bake=64, stand_in=True, limits=ImageLimits(side=9), access=Access(True))
+    reading = Reading(bake=64, stand_in=True, limits=ImageLimits(side=9), access=Access(True), normals=True)
     assert found == BatchOptions(reading=reading, explain=True, report="web")
     assert options("--bake", "0").reading == Reading(bake=0)
 
