@@ -3,28 +3,23 @@
 
 from __future__ import annotations
 
-import builtins
 import json
 import math
 import os
 import sys
-import traceback
 from collections.abc import Callable
 from pathlib import Path
 
 import bpy
 from mathutils import Euler
 
-sys.path.insert(0, os.environ["FMQM_ROOT"])
-DRAWN = 6  # seconds until a change is on the screen, drawn by software
+ROOT = os.environ["FMQM_ROOT"]
+sys.path[:0] = [ROOT, os.path.join(ROOT, "scripts")]
+from window_steps import play, view
+
 DISTANCE = 1.5  # between the two urns
 SCALE = 0.8  # of the interface, so that the sidebar shows what is below the results
 UNIT = 9000  # how many of the metric's color units into the list: an edge in the ornament
-
-
-def view() -> tuple[bpy.types.Window, bpy.types.Area]:
-    window = bpy.context.window_manager.windows[0]
-    return window, next(area for area in window.screen.areas if area.type == "VIEW_3D")
 
 
 def look_from(turn: float, center: tuple[float, float, float], distance: float) -> None:
@@ -84,31 +79,9 @@ STEPS: list[tuple[Callable[[], object], str]] = [
 ]  # fmt: skip
 
 
-def step() -> float | None:
+def measuring() -> bool:
     session = sys.modules.get("fmqm_addon.ui.session")
-    if session is not None and session.job is not None:
-        return 0.5  # the modal operator is still measuring; its own timer drives it
-    if not STEPS:
-        builtins.done()
-        return None
-    act, name = STEPS.pop(0)
-    window, area = view()
-    region = next(region for region in area.regions if region.type == "WINDOW")
-    try:
-        with bpy.context.temp_override(window=window, area=area, region=region):
-            act()
-    except Exception:
-        traceback.print_exc()
-        builtins.done()
-        return None
-    bpy.app.timers.register(lambda: picture(name), first_interval=DRAWN)
-    return None
+    return session is not None and session.job is not None
 
 
-def picture(name: str) -> None:
-    if name:
-        builtins.shot(name)
-    bpy.app.timers.register(step, first_interval=0.1)
-
-
-bpy.app.timers.register(step, first_interval=3)
+play(STEPS, measuring, print)

@@ -55,6 +55,24 @@ def add(
     return object_
 
 
+def skeleton() -> bpy.types.Object:
+    """Of one upright bone of length 1, "Bone"."""
+    object_ = bpy.data.objects.new("Skeleton", bpy.data.armatures.new("Skeleton"))
+    bpy.context.scene.collection.objects.link(object_)
+    bpy.context.view_layer.objects.active = object_
+    bpy.ops.object.mode_set(mode="EDIT")
+    object_.data.edit_bones.new("Bone").tail = (0, 0, 1)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    return object_
+
+
+def hang(object_: bpy.types.Object, skeleton_: bpy.types.Object, count: int | None = None) -> None:
+    """The first vertices of a mesh, or all of them, move with the bone."""
+    vertices = range(len(object_.data.vertices) if count is None else count)
+    object_.vertex_groups.new(name="Bone").add(vertices, 1.0, "REPLACE")
+    object_.modifiers.new("Armature", "ARMATURE").object = skeleton_
+
+
 def square(name: str = "Square", **options: object) -> bpy.types.Object:
     return add(name, SQUARE, [(0, 1, 2, 3)], **options)  # type: ignore[arg-type]
 

@@ -433,14 +433,8 @@ def test_vertex_colors_mark(fmqm: FMQMScene, lods: list[bpy.types.Object]) -> No
 
 
 def test_a_pose_marks_and_moving_all_together_does_not(fmqm: FMQMScene, lods: list[bpy.types.Object]) -> None:
-    rig = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
-    bpy.context.scene.collection.objects.link(rig)
-    bpy.context.view_layer.objects.active = rig
-    bpy.ops.object.mode_set(mode="EDIT")
-    rig.data.edit_bones.new("Bone").tail = (0, 0, 1)
-    bpy.ops.object.mode_set(mode="OBJECT")
-    lods[1].vertex_groups.new(name="Bone").add(range(len(lods[1].data.vertices)), 1.0, "REPLACE")
-    lods[1].modifiers.new("Armature", "ARMATURE").object = rig
+    rig = scenes.skeleton()
+    scenes.hang(lods[1], rig)
     fmqm.settings.space = "LOCAL"
     compare(lods[0], *lods[1:])
     bpy.ops.fmqm.measure()

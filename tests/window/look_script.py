@@ -1,18 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Runs inside the program, started by test_look.py: measures two objects, looks at them, takes pictures.
 
-FMQM_ZIP is the built extension, FMQM_OUT a folder for what is not a picture. The command that FMQM_SCREENSHOT
-names gives shot(name) and done().
+FMQM_ZIP is the built extension, FMQM_OUT a folder for what is not a picture, FMQM_ROOT the checkout. The command that
+FMQM_SCREENSHOT names gives shot(name) and done().
 """
 
 from __future__ import annotations
 
-import builtins
 import hashlib
 import json
 import os
 import sys
-import traceback
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -22,14 +20,11 @@ import numpy as np
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Vector
 
-DRAWN = 6  # seconds until a change is on the screen, drawn by software
+sys.path.insert(0, os.path.join(os.environ["FMQM_ROOT"], "scripts"))
+from window_steps import play, view
+
 OUT = Path(os.environ["FMQM_OUT"])
 REPORT: dict[str, object] = {}
-
-
-def view() -> tuple[bpy.types.Window, bpy.types.Area]:
-    window = bpy.context.window_manager.windows[0]
-    return window, next(area for area in window.screen.areas if area.type == "VIEW_3D")
 
 
 def texture() -> bpy.types.Material:
@@ -212,30 +207,4 @@ STEPS: list[tuple[Callable[[], object], str]] = [
 ]
 
 
-def step() -> float | None:
-    if "modal" in REPORT and session().job is not None:
-        return 0.5  # the modal operator is still measuring; its own timer drives it
-    if not STEPS:
-        builtins.done()
-        return None
-    act, name = STEPS.pop(0)
-    window, area = view()
-    region = next(region for region in area.regions if region.type == "WINDOW")
-    try:
-        with bpy.context.temp_override(window=window, area=area, region=region):
-            act()
-    except Exception:
-        (OUT / "error.txt").write_text(traceback.format_exc())
-        builtins.done()
-        return None
-    bpy.app.timers.register(lambda: picture(name), first_interval=DRAWN)
-    return None
-
-
-def picture(name: str) -> None:
-    if name:
-        builtins.shot(name)
-    bpy.app.timers.register(step, first_interval=0.1)
-
-
-bpy.app.timers.register(step, first_interval=3)
+play(STEPS, lambda: "modal" in REPORT and session().job is not None, (OUT / "error.txt").write_text)

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.house.test_extension import package  # noqa: F401  the fixture
+from tests.house.test_extension import ROOT, package  # noqa: F401  the fixture
 
 pytestmark = pytest.mark.program
 Pixels = np.ndarray
@@ -33,7 +33,7 @@ def pictures(tmp_path_factory: pytest.TempPathFactory, package: Path) -> dict[st
     out = tmp_path_factory.mktemp("pictures")
     done = subprocess.run(
         [*shlex.split(command), str(Path(__file__).with_name("look_script.py")), str(out / "view")],
-        env={**os.environ, "FMQM_ZIP": str(package), "FMQM_OUT": str(out)},
+        env={**os.environ, "FMQM_ZIP": str(package), "FMQM_OUT": str(out), "FMQM_ROOT": str(ROOT)},
         capture_output=True,
         text=True,
         timeout=400,

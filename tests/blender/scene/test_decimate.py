@@ -197,12 +197,7 @@ def test_a_saved_version_is_what_was_measured(torus: Path, tmp_path: Path, kind:
 
 def posed_skeleton() -> bpy.types.Object:
     """Of one bone, which has moved."""
-    skeleton = bpy.data.objects.new("Skeleton", bpy.data.armatures.new("Skeleton"))
-    bpy.context.scene.collection.objects.link(skeleton)
-    bpy.context.view_layer.objects.active = skeleton
-    bpy.ops.object.mode_set(mode="EDIT")
-    skeleton.data.edit_bones.new("Bone").tail = (0, 0, 1)
-    bpy.ops.object.mode_set(mode="OBJECT")
+    skeleton = scenes.skeleton()
     skeleton.pose.bones["Bone"].location = (0, 0.7, 0)
     return skeleton
 
@@ -213,8 +208,7 @@ def save_posed(file: Path) -> None:
     skeleton.scale = (1, 1, 2)
     posed = scenes.cube("Posed")
     posed.parent, posed.rotation_euler = skeleton, (0.5, 0, 0)  # sheared
-    posed.vertex_groups.new(name="Bone").add(range(8), 1.0, "REPLACE")
-    posed.modifiers.new("Armature", "ARMATURE").object = skeleton
+    scenes.hang(posed, skeleton)
     keyed = scenes.cube("Keyed")
     keyed.location = (4, 0, 0)
     keyed.shape_key_add(name="Basis")
@@ -291,8 +285,7 @@ def test_a_saved_object_keeps_what_its_modifiers_use(tmp_path: Path, kind: str) 
     monkey.constraints.new("COPY_ROTATION").target = mirror
     monkey.modifiers.new("Mirror", "MIRROR").mirror_object = mirror
     skeleton = posed_skeleton()
-    monkey.vertex_groups.new(name="Bone").add(range(100), 1.0, "REPLACE")
-    monkey.modifiers.new("Armature", "ARMATURE").object = skeleton
+    scenes.hang(monkey, skeleton, 100)
     scenes.square("Other")
     file, out = tmp_path / "rocks.blend", tmp_path / f"out{kind}"
     bpy.ops.wm.save_as_mainfile(filepath=str(file))
