@@ -34,9 +34,10 @@ _TAIL = b', "digest": "'
 def row_key(row: Row, options: BatchOptions, versions: Mapping[str, str]) -> str:
     """What a score depends on: the row, all options, the program, and size and time of the files that it names.
 
-    Its id and threshold are not part of it: they can change without a new score.
+    Its id, threshold, kind and level are not part of it: they can change without a new score.
     """
-    plain = asdict(row) | {"folder": os.path.abspath(row.folder), "id": None, "fail_under": None, "level": None}
+    unread = dict.fromkeys(("id", "fail_under", "level", "kind"))
+    plain = asdict(row) | unread | {"folder": os.path.abspath(row.folder)}
     stamps = [_stamp(path) for path in row.files()]
     text = json.dumps([plain, options.as_dict(), dict(versions), stamps], sort_keys=True)
     return hashlib.blake2b(text.encode("utf-8", "surrogatepass"), digest_size=16).hexdigest()

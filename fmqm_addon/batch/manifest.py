@@ -19,10 +19,11 @@ from ..metric.settings import SETTING_NAMES, Settings, info_of
 from .rows import Row
 
 REQUIRED = ("reference", "distorted")
-OPTIONAL = ("id", "ref_texture", "texture", "fail_under")
+OPTIONAL = ("id", "ref_texture", "texture", "fail_under", "kind", "level")
+MAX_LEVEL = 1000
 KNOWN = (*REQUIRED, *OPTIONAL, *SETTING_NAMES)
 
-_KIND_OF = {name: info_of(Settings, name).kind for name in SETTING_NAMES} | {"fail_under": float}
+_KIND_OF = {name: info_of(Settings, name).kind for name in SETTING_NAMES} | {"fail_under": float, "level": int}
 
 
 def plain_rows(reference: str, distorted: Sequence[str], ref_texture: str, textures: Sequence[str]) -> list[Row]:
@@ -181,6 +182,8 @@ def _row(plain: dict[str, Any], folder: str, settings: Settings) -> Row:
     row = Row(**{"id": ""} | values, settings=own, folder=folder)
     if row.fail_under is not None and not 0 <= row.fail_under <= 1:
         raise SettingsError(f"fail_under is {row.fail_under}; it must be between 0 and 1")
+    if row.level is not None and not 0 <= row.level <= MAX_LEVEL:
+        raise SettingsError(f"level is {row.level}; it must be between 0 and {MAX_LEVEL}")
     replace(settings, **dict(own))  # raises what is wrong with them
     return row
 

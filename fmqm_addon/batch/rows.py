@@ -73,7 +73,8 @@ class Row:
         fail_under: its own threshold, in [0, 1]; None takes the run's.
         settings: names and values that differ from the run's.
         folder: what relative paths are relative to; "" is the working directory.
-        level: of detail, where the row was made of a chain.
+        level: of detail, where the row was made of a chain; or of the distortion.
+        kind: of distortion; "" where unknown.
     """
 
     id: str
@@ -85,6 +86,7 @@ class Row:
     settings: tuple[tuple[str, Any], ...] = ()
     folder: str = ""
     level: int | None = None
+    kind: str = ""
 
     def path(self, name: str) -> str:
         """Where a named file is, from the working directory; "" stays ""."""
@@ -99,8 +101,9 @@ class Row:
         """What a record has of it, as plain values for JSON."""
         own = {name: str(value) if value == float("inf") else value for name, value in self.settings}
         textures = {"ref_texture": self.ref_texture or None, "texture": self.texture or None}
+        kind = {"kind": self.kind} if self.kind else {}
         names = {"id": self.id, "reference": self.reference, "distorted": self.distorted, "level": self.level}
-        return names | textures | {"settings": own}
+        return names | kind | textures | {"settings": own}
 
     def failed(self, why: str) -> dict[str, Any]:
         """The record of a row that was not scored."""

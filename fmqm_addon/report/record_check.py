@@ -224,7 +224,7 @@ def is_trust(value: object) -> bool:
 
 
 _KINDS: dict[str, Any] = {
-    **dict.fromkeys(("id", "reference", "distorted"), _is_text),
+    **dict.fromkeys(("id", "reference", "distorted", "kind"), _is_text),
     **dict.fromkeys(("error", "space", "texture", "ref_texture", "explanation"), _is_optional_text),
     **dict.fromkeys(SHOWN, lambda value: value is None or _is_share(value)),
     **dict.fromkeys(("patches", "samples"), lambda value: value is None or _is_count(value)),

@@ -112,8 +112,8 @@ def _json(value: Any) -> str:
 def csv_parts(records: Iterable[Mapping[str, Any]], raw: bool = False) -> Iterator[str]:
     """Numbers at full precision with a decimal point, whatever the locale; fields that failed are empty.
 
-    Sizes on screen and the other direction's columns are there, at the end, where they were measured. Goes through the
-    records three times.
+    Kinds of distortion, sizes on screen and the other direction's columns are there, at the end, where they are known.
+    Goes through the records four times.
 
     Args:
         raw: texts as they are. Else one that a spreadsheet would take for a formula comes after a single quote.
@@ -121,10 +121,11 @@ def csv_parts(records: Iterable[Mapping[str, Any]], raw: bool = False) -> Iterat
     names, numbers = ("id", "reference", "distorted"), (*SHOWN, *PERCEIVED)
     turned = numbers if _any_reverse(records) else ()
     sizes = SIZES if _any_size(records) else {}
-    yield _csv_line((*names, *numbers, "error", *BESIDE, *sizes, *(f"{REVERSE}{name}" for name in turned)))
+    kinds = ("kind",) if any("kind" in record for record in records) else ()
+    yield _csv_line((*names, *numbers, "error", *BESIDE, *kinds, *sizes, *(f"{REVERSE}{name}" for name in turned)))
     for record in records:
         values = [record[name] for name in names] + [value_of(record, name) for name in numbers] + [record["error"]]
-        values += [_joined(record[name]) for name in BESIDE]
+        values += [_joined(record[name]) for name in BESIDE] + [record.get(name) for name in kinds]
         found = record.get("screen_size")
         values += [None if found is None else found[kind]["pixels"] for kind in sizes.values()]
         reverse = record["reverse"] or _UNREAD
