@@ -70,7 +70,7 @@ def texture_sizes(spec: str, reading: Reading = AS_FOUND) -> list[int]:
     Raises:
         MeshError: no material has a color image.
     """
-    sides = [max(image.size) for image in _color_images(open_asset(spec, reading))]
+    sides = [max(image.size) for image in color_images(open_asset(spec, reading))]
     if not any(sides):
         raise MeshError(f"{spec}: no material has a color image; there is no texture to make smaller")
     largest = max(sides)
@@ -84,7 +84,7 @@ def shrink_textures(objects: list[bpy.types.Object], size: int | None) -> None:
     """
     if size is None:
         return
-    for image in _color_images(objects):
+    for image in color_images(objects):
         width, height = image.size
         if max(width, height) > size:
             factor = size / max(width, height)
@@ -306,7 +306,8 @@ def _write_images(objects: list[bpy.types.Object], folder: Path, stem: str) -> N
             image.unpack(method="REMOVE")
 
 
-def _color_images(objects: list[bpy.types.Object]) -> list[bpy.types.Image]:
+def color_images(objects: list[bpy.types.Object]) -> list[bpy.types.Image]:
+    """The images that the objects' materials use as colors, each once."""
     return [
         image
         for image in _images(objects)
