@@ -16,26 +16,39 @@ from typing import Any
 
 TIMEOUT = 60  # seconds for any one answer
 FLAGS = (
-    "--headless=new", "--remote-debugging-pipe", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage",
+    "--headless=new", "--remote-debugging-pipe", "--no-sandbox", "--disable-dev-shm-usage",
     "--no-first-run", "--disable-extensions", "--disable-background-networking",
 )  # fmt: skip
+NO_GPU = ("--disable-gpu",)
 
 
 class Page:
     """One page, and everything that its console said.
 
+    Args:
+        drawing: flags that say how it draws; NO_GPU, if there are none.
+
     Attributes:
         messages: the texts of console messages, uncaught errors and log entries, in their order.
     """
 
-    def __init__(self, program: str) -> None:
+    def __init__(self, program: str, *drawing: str) -> None:
         self._profile = tempfile.TemporaryDirectory(prefix="fmqm-chromium-")
         ours_in, theirs_out = _pipe()
         theirs_in, ours_out = _pipe()
         # Chromium reads commands from 3 and answers on 4.
         redirect = f'exec "$0" "$@" 3<&{theirs_in} 4>&{theirs_out}'
         self._process = subprocess.Popen(
-            ["bash", "-c", redirect, program, *FLAGS, f"--user-data-dir={self._profile.name}", "about:blank"],
+            [
+                "bash",
+                "-c",
+                redirect,
+                program,
+                *FLAGS,
+                *(drawing or NO_GPU),
+                f"--user-data-dir={self._profile.name}",
+                "about:blank",
+            ],
             pass_fds=(theirs_in, theirs_out),
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
@@ -86,7 +99,7 @@ class Page:
         return answer["result"].get("value")
 
     def press(self, key: str) -> None:
-        code = {"Enter": 13, "Tab": 9}[key]
+        code = {"Enter": 13, "Tab": 9, "ArrowLeft": 37, "ArrowUp": 38}[key]
         text = {"text": "\r"} if key == "Enter" else {}
         for kind in ("keyDown", "keyUp"):
             self._call("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=code, **text)
@@ -100,6 +113,26 @@ class Page:
         )
         for kind in ("mousePressed", "mouseReleased"):
             self._call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
+
+    def drag(self, selector: str, right: int, down: int) -> None:
+        """With the mouse, from the middle of the element, in steps."""
+        x, y = self.run(
+            f"(() => {{ const r = document.querySelector({json.dumps(selector)}).getBoundingClientRect();"
+            "return [r.x + r.width / 2, r.y + r.height / 2] })()"
+        )
+        self._call("Input.dispatchMouseEvent", type="mousePressed", x=x, y=y, button="left", clickCount=1)
+        for k in (1, 2, 3):
+            at = {"x": x + right * k / 3, "y": y + down * k / 3}
+            self._call("Input.dispatchMouseEvent", type="mouseMoved", **at, button="left", buttons=1)
+        self._call("Input.dispatchMouseEvent", type="mouseReleased", **at, button="left", clickCount=1)
+
+    def picture_of(self, selector: str) -> bytes:
+        """A PNG of an element that is in view."""
+        clip = self.run(
+            f"(() => {{ const r = document.querySelector({json.dumps(selector)}).getBoundingClientRect();"
+            "return {x: r.x + scrollX, y: r.y + scrollY, width: r.width, height: r.height, scale: 1} })()"
+        )
+        return base64.b64decode(self._call("Page.captureScreenshot", clip=clip)["data"])
 
     def picture(self, path: Path) -> None:
         """A PNG of the whole page."""

@@ -7,6 +7,8 @@ fmqmViewer.camera = (() => {
   const TURN = Math.PI / 24; // for a press of an arrow
   const ZOOM = 1.15; // for a press of + or -
   const FLIGHT = 500; // milliseconds
+  const MOST_POINTS = 20000; // that are looked at to find the distance from which all is seen
+  const SURROUNDINGS = 1.25; // patch diagonals to either side of a place that is flown to
   const STEEPEST = Math.PI / 2 - 0.01;
 
   // Angles and distance of what lies around a target, and back.
@@ -19,8 +21,8 @@ fmqmViewer.camera = (() => {
     return new THREE.Vector3(level * Math.sin(azimuth), -level * Math.cos(azimuth), radius * Math.sin(elevation));
   }
 
-  // element: where it is turned. changed: called whenever the view is another.
-  function cameraOf(element, box, changed) {
+  // element: where it is turned. box, points: of what is to be seen. changed: called whenever the view is another.
+  function cameraOf(element, box, points, changed) {
     const camera = new THREE.PerspectiveCamera(FIELD_OF_VIEW);
     camera.up.set(0, 0, 1);
     const controls = new THREE.OrbitControls(camera, element);
@@ -28,8 +30,13 @@ fmqmViewer.camera = (() => {
     controls.minDistance = 0.005;
     controls.maxDistance = 20;
     let flight = 0;
+    let whole = true; // all is in view, as at first: it stays so when panes change
+    function stop() {
+      cancelAnimationFrame(flight);
+      whole = false;
+    }
     controls.addEventListener("change", changed);
-    controls.addEventListener("start", () => cancelAnimationFrame(flight));
+    controls.addEventListener("start", stop);
 
     function look(target, place) {
       controls.target.copy(target);
@@ -39,7 +46,7 @@ fmqmViewer.camera = (() => {
     }
 
     function fly(target, place) {
-      cancelAnimationFrame(flight);
+      stop();
       if (matchMedia("(prefers-reduced-motion: reduce)").matches) return look(target, place);
       const from = controls.target.clone();
       const start = polar(camera.position.clone().sub(from));
@@ -59,10 +66,10 @@ fmqmViewer.camera = (() => {
       flight = requestAnimationFrame(step);
     }
 
-    // The distance from which a width and a height are seen whole in a pane.
-    function distanceFor(width, height) {
+    // The distance from which what lies so far to the side and above is seen.
+    function distanceFor(aside, above) {
       const slope = Math.tan((FIELD_OF_VIEW * Math.PI) / 360);
-      return (MARGIN / 2 / slope) * Math.max(height, width / camera.aspect);
+      return (MARGIN / slope) * Math.max(above, aside / camera.aspect);
     }
 
     function home() {
@@ -71,9 +78,16 @@ fmqmViewer.camera = (() => {
       const back = cartesian(place);
       const right = new THREE.Vector3(0, 0, 1).cross(back).normalize();
       const up = back.clone().cross(right);
-      const half = box.max.clone().sub(center);
-      const reach = (axis) => Math.abs(axis.x) * half.x + Math.abs(axis.y) * half.y + Math.abs(axis.z) * half.z;
-      place.radius = reach(back) + distanceFor(2 * reach(right), 2 * reach(up));
+      const at = new THREE.Vector3();
+      place.radius = 0.05;
+      for (const positions of points) {
+        const step = 3 * Math.ceil(positions.length / 3 / MOST_POINTS);
+        for (let k = 0; k < positions.length; k += step) {
+          at.fromArray(positions, k).sub(center);
+          const needed = at.dot(back) + distanceFor(Math.abs(at.dot(right)), Math.abs(at.dot(up)));
+          place.radius = Math.max(place.radius, needed);
+        }
+      }
       return [center, place];
     }
 
@@ -82,7 +96,7 @@ fmqmViewer.camera = (() => {
       const out = new THREE.Vector3(...normal);
       const place = out.length() > 0 ? polar(out) : home()[1];
       place.elevation = Math.min(Math.max(place.elevation, -STEEPEST), STEEPEST);
-      place.radius = distanceFor(3 * diagonal, 3 * diagonal);
+      place.radius = distanceFor(SURROUNDINGS * diagonal, SURROUNDINGS * diagonal);
       fly(new THREE.Vector3(...center), place);
     }
 
@@ -94,6 +108,11 @@ fmqmViewer.camera = (() => {
       look(controls.target.clone(), place);
     }
 
+    function reset() {
+      fly(...home());
+      whole = true;
+    }
+
     const keys = {
       ArrowLeft: () => turn(-TURN, 0, 1),
       ArrowRight: () => turn(TURN, 0, 1),
@@ -102,19 +121,24 @@ fmqmViewer.camera = (() => {
       "+": () => turn(0, 0, 1 / ZOOM),
       "=": () => turn(0, 0, 1 / ZOOM),
       "-": () => turn(0, 0, ZOOM),
-      0: () => fly(...home()),
+      0: () => reset(),
     };
     element.addEventListener("keydown", (event) => {
       if (!Object.hasOwn(keys, event.key) || event.ctrlKey || event.metaKey || event.altKey) return;
       event.preventDefault();
-      cancelAnimationFrame(flight);
+      stop();
       keys[event.key]();
     });
 
     return {
       camera,
       flyTo,
-      reset: (atOnce) => (atOnce ? look(...home()) : fly(...home())),
+      reset,
+      // For a pane of so many pixels, when panes have changed.
+      fit(width, height) {
+        camera.aspect = width / height;
+        if (whole) look(...home());
+      },
       // For a pane of so many pixels, before it is drawn.
       shape(width, height) {
         const distance = camera.position.distanceTo(controls.target);

@@ -12,12 +12,14 @@ from ....metric.evaluation import Result
 from ....metric.fields import Fields
 from ....metric.geometry import Floats
 from ...visual.heat_map import fitted_range
-from ...visual.layers import LAYERS, SCORE, field_values, value_range
+from ...visual.layers import LAYERS, LENGTH, SCORE, field_values, value_range
 from ...visual.worst import patch_view, worst_patches
 from .packing import packed
 
 WORST = 5  # places that are marked
 FIELDS = ("NCF_DIFFERENCE", "SDF_DIFFERENCE")  # layers that are shown by cells
+# Upper ends of their colors at least: what differs less is rounding. A color, and a share of the reference's diagonal.
+LEAST = {"NCF_DIFFERENCE": 0.01, "SDF_DIFFERENCE": 1e-4}
 _SPACINGS = 2.0  # of samples; a cell is so wide
 _MOST_CELLS = 96  # along the longest side
 _FULL = 255
@@ -42,7 +44,9 @@ def heat_data(result: Result, judge: Judge) -> dict[str, Any]:
             low, high = fitted_range(values)
         elif name in FIELDS:
             sampled = field_values(name, result.ref, result.dist, result.frame.scale)
-            low, high = ends[name] = value_range(name, sampled, True, result.frame.scale)
+            low, high = value_range(name, sampled, True, result.frame.scale)
+            high = max(high, LEAST[name] * (result.frame.scale if LAYERS[name].kind == LENGTH else 1.0))
+            ends[name] = high
         else:
             continue
         plain = None if values is None else [round(value, 5) for value in values.tolist()]
@@ -50,7 +54,7 @@ def heat_data(result: Result, judge: Judge) -> dict[str, Any]:
     return {
         "centers": _rounded(result.patch_centers.ravel()),
         "layers": layers,
-        "cells": [_cells(result, fields, [ends[name][1] for name in FIELDS]) for fields in (result.ref, result.dist)],
+        "cells": [_cells(result, fields, [ends[name] for name in FIELDS]) for fields in (result.ref, result.dist)],
         "partial": len(result.patches) < result.settings.patches,
         "worst": _worst(result, judge),
     }

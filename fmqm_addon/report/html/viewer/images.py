@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from .skins import LARGEST_SIDE
 
 MOST_PIXELS = 4 * LARGEST_SIDE**2  # of the images of a mesh
-MOST_BYTES = 5_000_000  # of them, encoded
+MOST_BYTES = 3_800_000  # of them, as text; a pair of 200,000 triangles stays below 25 MB with it, whatever it is
 _SMALLEST_SIDE = 64
 _LOSSLESS_SIDE = 512  # pixels; what is smaller stays as it is to the bit
 _JPEG_QUALITY = 92  # with full color resolution, as in the pictures
@@ -30,12 +30,17 @@ def encoded(images: Sequence[NDArray[np.uint8]]) -> list[Encoded]:
     """
     side = LARGEST_SIDE
     while side > _SMALLEST_SIDE and sum(_pixels(image, side) for image in images) > MOST_PIXELS:
-        side //= 2
+        side = _smaller(side)
     while True:
         made = [_encoded(image, side) for image in images]
         if side <= _SMALLEST_SIDE or sum(len(data) for _, data in made) <= MOST_BYTES:
             return made
-        side //= 2
+        side = _smaller(side)
+
+
+def _smaller(side: int) -> int:
+    """A side of half the pixels."""
+    return round(side / 2**0.5)
 
 
 def _size(image: NDArray[np.uint8], side: int) -> tuple[int, int]:

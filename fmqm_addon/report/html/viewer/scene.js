@@ -145,6 +145,32 @@ fmqmViewer.scene = (() => {
     return { cells: { value: texture }, cellsLow: { value: new THREE.Vector3(...cells.low) }, cellsSpan: { value: span } };
   }
 
+  // Whether a surface stands between an eye and a place on it: Möller and Trumbore's test of its triangles.
+  function hides(geometry, eye, place) {
+    const p = geometry.attributes.position.array;
+    const index = geometry.index.array;
+    const [ex, ey, ez] = eye.toArray();
+    const dx = place.x - ex, dy = place.y - ey, dz = place.z - ez;
+    const before = 1 - 0.01 / Math.hypot(dx, dy, dz); // what is this near does not hide it
+    for (let k = 0; k < index.length; k += 3) {
+      const a = 3 * index[k], b = 3 * index[k + 1], c = 3 * index[k + 2];
+      const ux = p[b] - p[a], uy = p[b + 1] - p[a + 1], uz = p[b + 2] - p[a + 2];
+      const vx = p[c] - p[a], vy = p[c + 1] - p[a + 1], vz = p[c + 2] - p[a + 2];
+      const hx = dy * vz - dz * vy, hy = dz * vx - dx * vz, hz = dx * vy - dy * vx;
+      const scale = ux * hx + uy * hy + uz * hz;
+      if (scale === 0) continue;
+      const sx = ex - p[a], sy = ey - p[a + 1], sz = ez - p[a + 2];
+      const u = (sx * hx + sy * hy + sz * hz) / scale;
+      if (u < 0 || u > 1) continue;
+      const qx = sy * uz - sz * uy, qy = sz * ux - sx * uz, qz = sx * uy - sy * ux;
+      const v = (dx * qx + dy * qy + dz * qz) / scale;
+      if (v < 0 || u + v > 1) continue;
+      const t = (vx * qx + vy * qy + vz * qz) / scale;
+      if (t > 0 && t < before) return true;
+    }
+    return false;
+  }
+
   // Both surfaces of a pair, each a mesh with a second one for its edges, and the uniforms that all share.
   async function pairOf(reference, level) {
     const meshes = [reference.mesh, level.mesh];
@@ -203,6 +229,7 @@ fmqmViewer.scene = (() => {
     return {
       scene,
       box,
+      points: geometries.map((geometry) => geometry.attributes.position.array),
       // One surface, as it is or painted, alone.
       choose(number, heat, wire) {
         shared.heat.value = heat;
@@ -212,6 +239,7 @@ fmqmViewer.scene = (() => {
           for (const material of materials) material.uniformsNeedUpdate = true;
         });
       },
+      hides: (eye, place) => hides(geometries[0], eye, place),
       light(lit) {
         shared.lit.value = lit;
       },

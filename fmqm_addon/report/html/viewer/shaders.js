@@ -66,7 +66,7 @@ fmqmViewer.shaders = {
       vec3 color = heat ? heatColor() : ownColor();
       if (wire) {
         bool dark = dot(color, vec3(0.3, 0.6, 0.1)) < 0.45;
-        gl_FragColor = vec4(vec3(dark ? 1.0 : 0.0), 0.55);
+        gl_FragColor = vec4(vec3(dark ? 1.0 : 0.0), 0.35);
         return;
       }
       if (lit) {

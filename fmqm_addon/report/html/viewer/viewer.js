@@ -7,6 +7,7 @@ fmqmViewer.show = (() => {
   const NARROW = "(max-width: 46rem)";
   const VIEWS = [...SURFACES, ...SURFACES.map((name) => `Heat Map on ${name}`)];
   const chosen = { wipe: [0, 1], layout: null, light: LIGHTS[0], wire: false, pins: true, on: 0, layer: null };
+  const REST = 100; // milliseconds
   let close = () => {};
 
   function element(kind, properties = {}, ...children) {
@@ -60,7 +61,7 @@ fmqmViewer.show = (() => {
     stage.append(canvas, panes, pins, handle);
     const legend = element("div", { className: "viewer-legend" });
     const sides = element("div", { className: "viewer-choices viewer-sides" });
-    const view = fmqmViewer.camera.cameraOf(stage, pair.box, later);
+    const view = fmqmViewer.camera.cameraOf(stage, pair.box, pair.points, later);
 
     // What is drawn: places on the stage, each with what it shows.
     function shown() {
@@ -75,7 +76,7 @@ fmqmViewer.show = (() => {
       }));
     }
 
-    let waiting = 0;
+    let waiting = 0, resting = 0;
     function later() {
       waiting ||= requestAnimationFrame(() => {
         waiting = 0;
@@ -101,6 +102,15 @@ fmqmViewer.show = (() => {
         renderer.render(pair.scene, view.camera);
       }
       placePins(drawn);
+      clearTimeout(resting);
+      resting = setTimeout(dimPins, REST);
+    }
+
+    // Those that the original hides; it is looked through once nothing moves.
+    function dimPins() {
+      const eye = view.camera.position;
+      const hidden = worst.map((each) => pair.hides(eye, new THREE.Vector3(...each.at)));
+      for (const pin of pins.children) pin.classList.toggle("viewer-behind", hidden[pin.dataset.rank]);
     }
 
     function placePins(drawn) {
@@ -117,12 +127,10 @@ fmqmViewer.show = (() => {
         worst.forEach((each, rank) => {
           const pin = pins.children[k * worst.length + rank];
           const at = new THREE.Vector3(...each.at);
-          const away = view.camera.position.clone().sub(at).dot(new THREE.Vector3(...each.normal)) < 0;
           const { x, y, z } = at.project(view.camera);
           pin.textContent = rank + 1;
           pin.dataset.rank = rank;
           pin.hidden = Math.abs(x) > 1 || Math.abs(y) > 1 || Math.abs(z) > 1;
-          pin.classList.toggle("viewer-behind", away);
           pin.style.left = `${pane.left - whole.left + ((x + 1) / 2) * pane.width}px`;
           pin.style.top = `${pane.top - whole.top + ((1 - y) / 2) * pane.height}px`;
         });
@@ -199,6 +207,7 @@ fmqmViewer.show = (() => {
       select("View", named([SIDE_BY_SIDE, WIPE]), chosen.layout, (value) => {
         chosen.layout = value;
         arrange();
+        fit();
       }),
       select("Heat Map", layers.map(({ name, label }) => [name, label]), chosen.layer, (value) => {
         chosen.layer = value;
@@ -252,11 +261,17 @@ fmqmViewer.show = (() => {
     place.append(body);
     place.classList.add("viewer-shown");
 
-    const resized = new ResizeObserver(later);
+    const fit = () => {
+      const { clientWidth, clientHeight } = chosen.layout === WIPE ? stage : panes.firstChild;
+      if (clientWidth && clientHeight) view.fit(clientWidth, clientHeight);
+      later();
+    };
+    const resized = new ResizeObserver(fit);
     close = () => {
       close = () => {};
       resized.disconnect();
       cancelAnimationFrame(waiting);
+      clearTimeout(resting);
       view.dispose();
       pair.dispose();
       renderer.dispose();
@@ -268,9 +283,8 @@ fmqmViewer.show = (() => {
     };
     pair.light(chosen.light === LIGHTS[0]);
     arrange();
+    fit();
     paint();
-    view.shape(...(chosen.layout === WIPE ? [stage.clientWidth, stage.clientHeight] : [panes.firstChild.clientWidth, panes.firstChild.clientHeight]));
-    view.reset(true);
     resized.observe(stage);
     draw();
     stage.focus({ preventScroll: true });
