@@ -24,7 +24,7 @@ SOFTWARE_GL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 NO_GL = ("--disable-3d-apis",)
 GREEN, BLUE = (40, 160, 90), (60, 90, 200)  # the original's color and the LOD's
 BACKGROUND = (236, 237, 239)
-REST = "new Promise((done) => setTimeout(() => requestAnimationFrame(() => requestAnimationFrame(done)), {}))"
+REST = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
 OPEN = """(async () => {
   document.querySelectorAll(".viewer-open")[0].click();
   for (let k = 0; k < 300 && !document.querySelector(".viewer-shown"); k++) {
@@ -80,10 +80,21 @@ def choose(page: Page, label: str, value: object) -> None:
     page.run(CHOOSE % (json.dumps(label), text, text))
 
 
-def pixels(page: Page, selector: str = ".viewer-stage", wait: int = 0) -> np.ndarray:
+def pixels(page: Page, selector: str = ".viewer-stage") -> np.ndarray:
     """(H, W, 3) int of an element, once it is drawn."""
-    page.run(REST.format(wait))
+    page.run(REST)
     return np.asarray(Image.open(io.BytesIO(page.picture_of(selector))).convert("RGB")).astype(int)
+
+
+def landed(page: Page) -> np.ndarray:
+    """The stage, once nothing moves on it any more."""
+    last = pixels(page)
+    while True:
+        page.run("new Promise((done) => setTimeout(done, 150))")
+        now = pixels(page)
+        if np.array_equal(now, last):
+            return now
+        last = now
 
 
 def pane(page: Page, number: int) -> np.ndarray:
@@ -126,7 +137,7 @@ def test_it_turns_by_mouse_and_keys_and_back(page: Page, report: Path) -> None:
     assert (np.abs(turned - dragged) > 20).mean() > 0.01
     page.run("document.querySelector('.viewer-choices button').click()")
     inside = (slice(10, -10), slice(10, -10))  # the outline shows what has the focus
-    assert (np.abs(pixels(page, wait=800) - first)[inside] > 20).mean() < 0.001
+    assert (np.abs(landed(page) - first)[inside] > 20).mean() < 0.001
     assert page.messages == []
 
 
@@ -181,7 +192,7 @@ def test_pins_and_their_buttons_fly_to_the_worst_places(page: Page, report: Path
     count = page.run("document.querySelectorAll('.viewer-places button').length")
     assert count == page.run("document.querySelectorAll('.viewer-pin').length") > 2
     page.run("document.querySelector('.viewer-places li:nth-child(2) button').click()")
-    assert (np.abs(pixels(page, wait=900) - before) > 20).mean() > 0.05
+    assert (np.abs(landed(page) - before) > 20).mean() > 0.05
     place = """(() => {
       const stage = document.querySelector(".viewer-stage").getBoundingClientRect();
       const pin = [...document.querySelectorAll(".viewer-pin")].find((each) => each.textContent === "%d");
@@ -190,7 +201,7 @@ def test_pins_and_their_buttons_fly_to_the_worst_places(page: Page, report: Path
     })()"""
     assert page.run(place % 2) == pytest.approx([0.5, 0.5], abs=0.2)
     page.run("[...document.querySelectorAll('.viewer-pin')].find((each) => each.textContent === '1').click()")
-    page.run(REST.format(900))
+    landed(page)
     assert page.run(place % 1) == pytest.approx([0.5, 0.5], abs=0.2)
     assert page.messages == []
 
@@ -225,7 +236,7 @@ def test_a_phone_has_the_wipe_first_and_all_in_its_width(page: Page, report: Pat
     )
     for layout in ("Wipe", "Side by Side"):
         choose(page, "View", layout)
-        page.run(REST.format(0))
+        page.run(REST)
         assert page.run("document.documentElement.scrollWidth") == 375 and page.run(outside) == 0
     colors = "getComputedStyle(document.querySelector('.viewer-stage')).backgroundColor"
     assert (sum(map(int, re.findall(r"\d+", page.run(colors))[:3])) < 300) == dark
