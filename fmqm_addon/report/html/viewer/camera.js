@@ -30,6 +30,7 @@ fmqmViewer.camera = (() => {
     controls.minDistance = 0.005;
     controls.maxDistance = 20;
     let flight = 0;
+    let aspect = 1;
     let whole = true; // all is in view, as at first: it stays so when panes change
     function stop() {
       cancelAnimationFrame(flight);
@@ -69,7 +70,7 @@ fmqmViewer.camera = (() => {
     // The distance from which what lies so far to the side and above is seen.
     function distanceFor(aside, above) {
       const slope = Math.tan((FIELD_OF_VIEW * Math.PI) / 360);
-      return (MARGIN / slope) * Math.max(above, aside / camera.aspect);
+      return (MARGIN / slope) * Math.max(above, aside / aspect);
     }
 
     function home() {
@@ -136,7 +137,7 @@ fmqmViewer.camera = (() => {
       reset,
       // For a pane of so many pixels, when panes have changed.
       fit(width, height) {
-        camera.aspect = width / height;
+        aspect = width / height;
         if (whole) look(...home());
       },
       // For a pane of so many pixels, before it is drawn.
