@@ -23,6 +23,7 @@ LEAST = {"NCF_DIFFERENCE": 0.01, "SDF_DIFFERENCE": 1e-4}
 _SPACINGS = 2.0  # of samples; a cell is so wide
 _MOST_CELLS = 96  # along the longest side
 _FULL = 255
+_DIGITS = 7  # after the point, in diagonals of the reference
 
 
 def heat_data(result: Result, judge: Judge) -> dict[str, Any]:
@@ -74,7 +75,7 @@ def _cells(result: Result, fields: Fields, highs: list[float]) -> dict[str, Any]
     area = sum(patch.area for patch in result.patches)
     low, high = points.min(axis=0), points.max(axis=0)
     size = max(_SPACINGS * float(np.sqrt(area / len(points))), float((high - low).max()) / (_MOST_CELLS - 3), 1e-6)
-    low = low - size  # an empty cell all around
+    size, low = round(size, _DIGITS), np.round(low - size, _DIGITS)  # an empty cell all around
     shape = ((high - low) / size).astype(int) + 2
     cell = ((points - low) / size).astype(np.int64)
     key = (cell[:, 2] * shape[1] + cell[:, 1]) * shape[0] + cell[:, 0]
@@ -88,7 +89,7 @@ def _cells(result: Result, fields: Fields, highs: list[float]) -> dict[str, Any]
     columns.append(np.where(counts > 0, _FULL, 0))
     return {
         "low": _rounded(low),
-        "size": round(size, 7),
+        "size": size,
         "shape": shape.tolist(),
         "data": packed(np.stack(columns, axis=1).astype(np.uint8)),
     }
@@ -105,7 +106,7 @@ def _worst(result: Result, judge: Judge) -> list[dict[str, Any]]:
                 "at": _rounded(result.patch_centers[worst.patch]),
                 "center": _rounded(center),
                 "normal": _rounded(normal),
-                "diagonal": round(diagonal, 7),
+                "diagonal": round(diagonal, _DIGITS),
                 "score": round(worst.score, 5),
                 "blame": LAYERS[worst.blame].label,
                 "value": round(worst.value, 5),
@@ -115,4 +116,4 @@ def _worst(result: Result, judge: Judge) -> list[dict[str, Any]]:
 
 
 def _rounded(numbers: Floats) -> list[float]:
-    return [round(number, 7) for number in np.asarray(numbers, np.float64).tolist()]
+    return [round(number, _DIGITS) for number in np.asarray(numbers, np.float64).tolist()]
