@@ -92,22 +92,34 @@ class Search:
         settings: that decide. While searching only FAST_SCORED_PATCHES of the patches are scored.
         build_query: makes the spatial query of a surface.
         written: the arrays of a version as its file holds them, in the same frame; these decide. None: no file.
+        repeats: seeds of the scores that decide, as of a Measurement.
     """
 
     def __init__(
-        self, read: VersionReader, build_query: QueryBuilder, settings: Settings, written: VersionReader | None = None
+        self,
+        read: VersionReader,
+        build_query: QueryBuilder,
+        settings: Settings,
+        written: VersionReader | None = None,
+        repeats: int = 1,
     ) -> None:
         few = replace(settings, scored_patches=min(settings.scored_patches or settings.patches, FAST_SCORED_PATCHES))
         self._build_query = build_query
         self._read = {True: read, False: written or read}
         self._settings = {True: few, False: settings}
-        self._same_settings = few.scored_patches == (settings.scored_patches or settings.patches)
+        self._repeats = {True: 1, False: repeats}
+        self._same_settings = repeats == 1 and few.scored_patches == (settings.scored_patches or settings.patches)
         self._two_rounds = written is not None or not self._same_settings
         self._measurements: dict[bool, Measurement] = {}
         self._steps: dict[tuple[bool, Version], Step] = {}
         self.triangles = 0  # of the asset as it is; this, its warnings and notes after preparing
         self.warnings: tuple[str, ...] = ()
         self.notes: tuple[str, ...] = ()
+
+    @property
+    def measurement(self) -> Measurement:
+        """That of the scores that decide; only after prepare()."""
+        return self._measurements[False]
 
     def prepare(self) -> Work[None]:
         """Reads the asset and prepares it as the reference.
@@ -120,11 +132,11 @@ class Search:
         self.triangles = len(asset.triangles)
         rounds = (False,) if self._same_settings else (True, False)
         for number, quick in enumerate(rounds):
-            measurement = Measurement(asset, self._build_query, self._settings[quick])
+            measurement = Measurement(asset, self._build_query, self._settings[quick], self._repeats[quick])
             yield from as_part(measurement.prepare(), number / len(rounds), 1 / len(rounds), "Preparing")
             self._measurements[quick] = measurement
         self._measurements.setdefault(True, measurement)
-        surface = self._measurements[False].reference
+        surface = self.measurement.reference
         self.warnings, self.notes = surface.warnings, surface.notes
 
     def ratios(self, max_triangles: int | None = None) -> list[Version]:
@@ -310,10 +322,11 @@ def decimating(
     Args:
         read, build_query, settings, written: as for Search.
     """
-    return Stepper(_decimating(Search(read, build_query, settings, written), goal))
+    return Stepper(searching(Search(read, build_query, settings, written), goal))
 
 
-def _decimating(search: Search, goal: DecimationGoal) -> Work[DecimationResult]:
+def searching(search: Search, goal: DecimationGoal) -> Work[DecimationResult]:
+    """The searches for a goal, one after the other, in an asset that is not prepared yet."""
     yield from as_part(search.prepare(), 0.0, _PREPARED)
     ratios = search.ratios(goal.max_triangles)
     if goal.max_triangles is not None:

@@ -504,7 +504,7 @@ def test_scores_stay_where_an_object_is_deleted_while_it_is_measured(
     before = [row.scores for row in fmqm.rows]
     error = measure.Outcome(target_of(lods[0]), target_of(lods[2]), error="why")
     bpy.data.objects.remove(lods[2])
-    measuring._write_row(fmqm, error, "{}")
+    measuring.write_row(fmqm, error, "{}")
     assert [row.scores for row in fmqm.rows] == before and not fmqm.rows[1].error
 
 
@@ -647,7 +647,7 @@ def test_rows_at_other_settings_are_told_apart(fmqm: FMQMScene, lods: list[bpy.t
         if preset == "CUSTOM":
             fmqm.settings.samples = QUICK.samples
         outcome = measure.Outcome(target_of(lods[0]), target_of(lod))
-        measuring._write_row(fmqm, outcome, json.dumps(metric_settings(fmqm.settings).as_dict()))
+        measuring.write_row(fmqm, outcome, json.dumps(metric_settings(fmqm.settings).as_dict()))
         rows.append(fmqm.rows[len(rows)])
     assert [settings_name(row) for row in rows] == ["Quick", "Quick", "Custom"]
     assert comparable(rows[0], rows[1]) and not comparable(rows[1], rows[2])

@@ -17,6 +17,7 @@ from ...comparison.decimation import Version, VersionReader
 from ...folders import own_folder, take_place
 from ...metric.errors import FileError, MeshError, SettingsError
 from ...metric.surface import MeshArrays
+from ..materials.color_images import color_images, falling_sides, images_of, shrink
 from ..materials.types import Reading
 from ..scene.decimate import add_modifiers, scene_reader
 from ..scene.members import instanced, lineage
@@ -27,7 +28,6 @@ from .flatten import flatten_objects
 from .load import last_line, load_mesh, named, open_file
 from .loaded import mute_imports
 
-NOT_COLOR = "Non-Color"
 _ENDINGS = {"JPEG": ".jpg", "TARGA": ".tga", "TARGA_RAW": ".tga", "OPEN_EXR": ".exr", "TIFF": ".tif"}
 
 
@@ -70,11 +70,7 @@ def texture_sizes(spec: str, reading: Reading = AS_FOUND) -> list[int]:
     Raises:
         MeshError: no material has a color image.
     """
-    sides = [max(image.size) for image in color_images(open_asset(spec, reading))]
-    if not any(sides):
-        raise MeshError(f"{spec}: no material has a color image; there is no texture to make smaller")
-    largest = max(sides)
-    return [largest, *(2**power for power in reversed(range((largest - 1).bit_length())))]
+    return list(falling_sides(open_asset(spec, reading), spec))
 
 
 def shrink_textures(objects: list[bpy.types.Object], size: int | None) -> None:
@@ -85,11 +81,7 @@ def shrink_textures(objects: list[bpy.types.Object], size: int | None) -> None:
     if size is None:
         return
     for image in color_images(objects):
-        width, height = image.size
-        if max(width, height) > size:
-            factor = size / max(width, height)
-            image.scale(max(1, round(width * factor)), max(1, round(height * factor)))
-            image.pack()
+        shrink(image, size)
 
 
 def written_reader(spec: str, path: str, reading: Reading = AS_FOUND) -> VersionReader:
@@ -286,7 +278,7 @@ def _keep_used(objects: Sequence[bpy.types.Object]) -> None:
 def _write_images(objects: list[bpy.types.Object], folder: Path, stem: str) -> None:
     """The materials' images as files in a folder, under names that overwrite no other asset's beside it."""
     taken: set[str] = set()
-    for image in _images(objects):
+    for image in images_of(objects):
         if image.source not in {"FILE", "GENERATED"} or not max(image.size):
             continue
         if image.source == "GENERATED" and image.packed_file is None:
@@ -304,29 +296,3 @@ def _write_images(objects: list[bpy.types.Object], folder: Path, stem: str) -> N
         image.filepath_raw = str(folder / name)
         if image.packed_file is not None:
             image.unpack(method="REMOVE")
-
-
-def color_images(objects: list[bpy.types.Object]) -> list[bpy.types.Image]:
-    """The images that the objects' materials use as colors, each once."""
-    return [
-        image
-        for image in _images(objects)
-        if image.colorspace_settings.name != NOT_COLOR and image.source in {"FILE", "GENERATED"} and max(image.size) > 0
-    ]
-
-
-def _images(objects: list[bpy.types.Object]) -> list[bpy.types.Image]:
-    """The images that the objects' materials use, each once."""
-    materials = [slot.material for object_ in objects for slot in object_.material_slots if slot.material is not None]
-    found = [image for material in materials for image in _images_of(material.node_tree, set())]
-    return list(dict.fromkeys(found))
-
-
-def _images_of(tree: bpy.types.NodeTree | None, seen: set[str]) -> Iterator[bpy.types.Image]:
-    if tree is None or tree.name_full in seen:
-        return
-    for node in tree.nodes:
-        if node.type == "GROUP" and node.node_tree is not None:
-            yield from _images_of(node.node_tree, seen | {tree.name_full})
-        elif node.type == "TEX_IMAGE" and node.image is not None:
-            yield node.image

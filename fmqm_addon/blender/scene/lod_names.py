@@ -58,6 +58,14 @@ def stem_of_name(name: str) -> str:
     return _COPY_NUMBER.sub("", name).lower() if found is None else found.stem
 
 
+def without_level_0(name: str) -> str:
+    """A name to which another level can be added: Rock_LOD0 and LOD0_Rock without that, others as they are."""
+    match = _LOD.search(name)
+    if match is None or int(match[1]) != 0:
+        return name
+    return (name[: match.start()].rstrip(_SEPARATORS) + name[match.end() :]).strip(_SEPARATORS) or name
+
+
 def is_collider(name: str) -> bool:
     """Whether a name tells a hull that stands for an asset where things collide, and is never seen."""
     return _COLLIDER.fullmatch(_COPY_NUMBER.sub("", name)) is not None

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The sidebar's buttons."""
 
-from . import decimate, inputs, measure, pick, presets, probe, results, save, screen_sizes, view
+from . import chain, decimate, inputs, measure, pick, presets, probe, results, save, screen_sizes, view
 
 CLASSES: tuple[type, ...] = (
     *inputs.CLASSES,
@@ -13,5 +13,6 @@ CLASSES: tuple[type, ...] = (
     *pick.CLASSES,
     *probe.CLASSES,
     *decimate.CLASSES,
+    *chain.CLASSES,
     *screen_sizes.CLASSES,
 )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Decimate to Quality: a copy of the active object with as few triangles as a target allows."""
+"""Decimate to Quality: a copy of the active object with as few triangles, and as small textures, as targets allow."""
 
 from __future__ import annotations
 
@@ -7,29 +7,27 @@ from typing import ClassVar
 
 import bpy
 
-from ...blender.scene.decimate import decimated_copy, scene_reader
-from ...blender.scene.fingerprint import fingerprint
-from ...blender.scene.node_queries import surface_query
-from ...blender.scene.target import target_of
-from ...comparison.decimation import DecimationGoal, DecimationResult, SearchResult, Step, VersionReader, decimating
+from ...blender.materials.color_images import falling_sides
+from ...blender.materials.types import Reading
+from ...blender.scene.parts import parts_of
+from ...comparison.decimation import DecimationGoal, Step, TargetResult
 from ...comparison.judge import Judge
-from ...metric.errors import FMQMError
-from ...metric.settings import Settings
-from ...metric.stepper import Stepper, Work
+from ...comparison.pair import PairOptions
 from ...report.numbers import score_text
-from .. import session
-from ..modal import SteppedOperator
 from ..properties.decimate import FMQMDecimate
-from ..properties.settings import metric_settings
+from ..properties.settings import plain
+from ..versions import Search, VersionsOperator, hide, why_not
 from .polls import allowed
 
+_LARGEST = 10**9  # pixels: textures as they are come before all smaller ones
 
-class FMQM_OT_decimate(SteppedOperator, bpy.types.Operator):  # noqa: N801
+
+class FMQM_OT_decimate(VersionsOperator, bpy.types.Operator):  # noqa: N801
     bl_idname = "fmqm.decimate"
     bl_label = "Decimate to Quality"
     bl_description = (
-        "Copy the active object with a live Decimate modifier, as strong as the target allows. The original stays as "
-        "it is and is hidden behind it. Esc cancels"
+        "Copy the active object with a live Decimate modifier, as strong as the target allows, and measure the copy. "
+        "The original stays as it is and is hidden behind it. Esc cancels"
     )
     bl_options: ClassVar = {"UNDO"}  # no REGISTER: adjusting the last operation would search all over again
 
@@ -37,100 +35,78 @@ class FMQM_OT_decimate(SteppedOperator, bpy.types.Operator):  # noqa: N801
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return allowed(cls, _why_not(context))
+        return allowed(cls, why_not(context))
 
-    def begin(self, context: bpy.types.Context) -> bool:
-        fmqm, self._name = context.scene.fmqm, context.active_object.name_full
+    def asked(self, context: bpy.types.Context, _: PairOptions, reading: Reading) -> Search:
+        fmqm, active = context.scene.fmqm, context.active_object
+        decimate, judge = fmqm.decimate, Judge[fmqm.judge]
+        sides = falling_sides(parts_of(active, reading).objects, active.name) if decimate.textures else ()
         goal = DecimationGoal(
-            (round(fmqm.decimate.target, 4),),  # a property is float32: 0.9 must not become 0.90000004
-            fmqm.decimate.max_triangles if fmqm.decimate.limited else None,
-            judge=Judge[fmqm.judge],
+            (plain(decimate.target),),
+            decimate.max_triangles if decimate.limited else None,
+            plain(decimate.texture_target) if decimate.textures else None,
+            sides,
+            judge,
         )
-        self._judge = goal.judge
-        try:
-            settings = metric_settings(fmqm.settings)
-        except FMQMError as error:
-            self.report({"ERROR"}, str(error))
-            return False
-        context.view_layer.update()  # or a transform that is still to be applied would pass for a change
-        self._scene, self._mark = context.scene.name_full, fingerprint(target_of(context.active_object), False)
-        self.stepper = Stepper(_attempt(scene_reader([self._name], self._name), goal, settings))
-        return True
+        name = f" {judge.column} {goal.targets[0]:.2f}"
+        return Search(goal, active.name, (_free(active.name, name),), active.name)
 
     def finish(self, context: bpy.types.Context) -> set[str]:
-        """The copy and the path it took, in one undo step."""
-        result = self.stepper.result
-        if isinstance(result, FMQMError):
-            self.report({"WARNING"}, str(result))
+        """The copy, its row and the path that the search took, in one undo step."""
+        there = self.found()
+        if there is None:
             return {"CANCELLED"}
-        found = result.results[0].last
-        original = next((object_ for object_ in bpy.data.objects if object_.name_full == self._name), None)
-        scene = next((scene for scene in bpy.data.scenes if scene.name_full == self._scene), None)
-        if original is None or scene is None:
-            gone = self._name if original is None else "The scene"
-            self.report({"WARNING"}, f"{gone} is gone, and what was found with it")
-            return {"CANCELLED"}
-        if fingerprint(target_of(original), False) != self._mark:
-            self.report({"WARNING"}, f"{self._name} was changed meanwhile; search again")
-            return {"CANCELLED"}
-        best, judge = found.best, self._judge
-        score = best.score(judge)
-        _write_path(scene.fmqm.decimate, original.name, found, judge)
-        if not found.reached:
+        scene, original, found = there
+        searched, judge = found.result.results[0], self.search.goal.judge
+        _write_path(scene.fmqm.decimate, original.name, searched, judge)
+        if not found.versions:
+            best = searched.last.best
+            score = best.score(judge)
             self.report(
                 {"WARNING"},
-                f"{self._name} misses {found.target:.2f} even with {best.triangles:,} triangles"
+                f"{original.name} misses {searched.last.target:.2f} even with {best.triangles:,} triangles"
                 + ("" if score is None else f" ({judge.column} {score_text(score)})"),
             )
             return {"CANCELLED"}
-        copy = decimated_copy(original, best.version.ratio, f"{original.name} {judge.column} {found.target:.2f}")
-        context.view_layer.update()
-        hidden = ""
-        if copy.name in context.view_layer.objects:  # not in another scene, or where its collection is excluded
-            for object_ in context.selected_objects:
-                object_.select_set(False)
-            context.view_layer.objects.active = copy
-            copy.select_set(True)
-            original.hide_set(True)  # the two would flicker, each as near to the viewer as the other
-            hidden = f"; {original.name} is hidden, Alt H shows it"
-        self.report(
-            {"INFO"},
-            f"{copy.name}: {best.triangles:,} of {result.triangles:,} triangles, "
-            f"{judge.column} {score_text(score)}{hidden}",
-        )
+        (copy,) = self.make(context, scene, original, found)
+        hidden = hide(context, [original], copy)
+        made = found.versions[0]
+        comparison = made.outcome.comparison
+        assert comparison is not None
+        side = f", textures of {made.version.texture} pixels" if made.version.texture else ""
+        numbers = f"{made.outcome.triangles:,} of {found.result.triangles:,} triangles{side}"
+        told = f"{copy.name}: {numbers}, {judge.column} {score_text(judge.score(comparison))}{hidden}"
+        if searched.last.reached:
+            self.report({"INFO"}, told)
+        else:
+            self.report({"WARNING"}, f"{told}. It misses {searched.last.target:.2f} for smaller textures: they stay")
         return {"FINISHED"}
 
 
-def _why_not(context: bpy.types.Context) -> str:
-    """Why there is nothing to decimate, for the greyed-out button; "" if there is."""
-    active = context.active_object
-    if session.job is not None:
-        return "A measurement is running"
-    if active is None or active.type != "MESH":
-        return "Make a mesh object the active one"
-    return "" if active.mode == "OBJECT" else "Leave the object's edit or paint mode"
+def _free(base: str, suffix: str) -> str:
+    """The suffix, numbered where there is an object of such a name."""
+    free, number = suffix, 0
+    while base + free in bpy.data.objects:
+        number += 1
+        free = f"{suffix}.{number:03d}"
+    return free
 
 
-def _attempt(read: VersionReader, goal: DecimationGoal, settings: Settings) -> Work[DecimationResult | FMQMError]:
-    """The search, or why it could not be done."""
-    try:
-        return (yield from decimating(read, surface_query, goal, settings).steps())
-    except FMQMError as error:
-        return error
-
-
-def _write_path(decimate: FMQMDecimate, name: str, found: SearchResult, judge: Judge) -> None:
-    """Its versions, from the most triangles down; "about" where few patches were looked at."""
-    steps = sorted(found.path, key=lambda step: (-step.triangles, step.quick))
+def _write_path(decimate: FMQMDecimate, name: str, searched: TargetResult, judge: Judge) -> None:
+    """Its versions, from the most triangles and largest textures down; "about" where few patches were looked at."""
+    steps = [step for found in (searched.geometry, searched.texture) if found is not None for step in found.path]
+    steps.sort(key=lambda step: (-step.triangles, -(step.version.texture or _LARGEST), step.quick))
     lines = list(dict.fromkeys(_step_text(step, judge) for step in steps))
     decimate.path, decimate.path_of = "\n".join(lines), name
-    decimate.found = lines.index(_step_text(found.best, judge)) if found.reached else -1
+    reached = [found for found in (searched.geometry, searched.texture) if found is not None and found.reached]
+    decimate.found = lines.index(_step_text(reached[-1].best, judge)) if reached else -1
 
 
 def _step_text(step: Step, judge: Judge) -> str:
     score = step.score(judge)
     reached = "nothing left" if score is None else score_text(score)
-    return f"{step.triangles:,} triangles: {'about ' if step.quick else ''}{reached}"
+    side = f", textures of {step.version.texture}" if step.version.texture else ""
+    return f"{step.triangles:,} triangles{side}: {'about ' if step.quick else ''}{reached}"
 
 
 CLASSES = (FMQM_OT_decimate,)

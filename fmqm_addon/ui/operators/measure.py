@@ -14,6 +14,7 @@ from ...blender.materials.types import Reading
 from ...blender.scene.lods import are_kin
 from ...blender.scene.measure import Outcome, measuring
 from ...blender.scene.target import Target, target_of
+from ...comparison.pair import PairOptions
 from ...metric.errors import FMQMError
 from ...metric.geometry import Floats
 from ...report.trust_table import trust_dict
@@ -60,20 +61,17 @@ class FMQM_OT_measure(SteppedOperator, bpy.types.Operator):  # noqa: N801
     def begin(self, context: bpy.types.Context) -> bool:
         fmqm = context.scene.fmqm
         try:
-            options = pair_options(fmqm.settings)
+            options, reading, self._settings_text = asked_of(fmqm)
         except FMQMError as error:
             self.report({"ERROR"}, str(error))
             return False
         compared = [target_of(target) for item in fmqm.compared if (target := item_target(item)) is not None]
         self._scene = context.scene.name_full
-        settings = fmqm.settings
-        patterns = {name: text for name in ("include", "exclude") if (text := getattr(settings, name).strip())}
-        self._settings_text = json.dumps(options.as_dict() | patterns)
         self.stepper = measuring(
             target_of(reference_of(fmqm), fmqm.bare_reference),
             list(dict.fromkeys(compared)),
             options,
-            Reading(include=patterns_of(settings.include), exclude=patterns_of(settings.exclude)),
+            reading,
         )
         return True
 
@@ -85,10 +83,8 @@ class FMQM_OT_measure(SteppedOperator, bpy.types.Operator):  # noqa: N801
             return {"CANCELLED"}
         outcomes = self.stepper.result
         for outcome in outcomes:
-            _write_row(scene.fmqm, outcome, self._settings_text)
-        _choose_row(scene.fmqm, outcomes[0])
-        forget_removed()  # of rows that these replace
-        show_heat_map(scene)
+            write_row(scene.fmqm, outcome, self._settings_text)
+        show_rows(scene, outcomes[0])
         failed = [outcome for outcome in outcomes if outcome.error]
         total = sum(outcome.seconds.get("total", 0.0) for outcome in outcomes)
         if failed:
@@ -116,7 +112,20 @@ class FMQM_OT_cancel(bpy.types.Operator):  # noqa: N801
         return {"FINISHED"}
 
 
-def _write_row(fmqm: FMQMScene, outcome: Outcome, settings_text: str) -> None:
+def asked_of(fmqm: FMQMScene) -> tuple[PairOptions, Reading, str]:
+    """What the settings ask about pairs, how assets are read, and both as rows keep them.
+
+    Raises:
+        SettingsError: the values contradict one another.
+    """
+    settings = fmqm.settings
+    options = pair_options(settings)
+    patterns = {name: text for name in ("include", "exclude") if (text := getattr(settings, name).strip())}
+    reading = Reading(include=patterns_of(settings.include), exclude=patterns_of(settings.exclude))
+    return options, reading, json.dumps(options.as_dict() | patterns)
+
+
+def write_row(fmqm: FMQMScene, outcome: Outcome, settings_text: str) -> None:
     """Replaces the row of the same two assets, or adds one. Scores of what has been deleted meanwhile stay."""
     key = (outcome.reference_target, outcome.target)
     row = next((row for row in fmqm.rows if row_targets(row) == key), None)
@@ -167,9 +176,12 @@ def _stand(target: Target) -> Floats | None:
     return np.array(members[0].matrix_world, np.float64) if len(members) == 1 else None
 
 
-def _choose_row(fmqm: FMQMScene, outcome: Outcome) -> None:
+def show_rows(scene: bpy.types.Scene, outcome: Outcome) -> None:
+    """After rows were written: chooses that of an outcome, and shows its heat map where that is wanted."""
     key = (outcome.reference_target, outcome.target)
-    fmqm.row_index = next((index for index, row in enumerate(fmqm.rows) if row_targets(row) == key), 0)
+    scene.fmqm.row_index = next((index for index, row in enumerate(scene.fmqm.rows) if row_targets(row) == key), 0)
+    forget_removed()  # of rows that these replace
+    show_heat_map(scene)
 
 
 def _draw_in_object_menu(self: bpy.types.Menu, _: bpy.types.Context) -> None:

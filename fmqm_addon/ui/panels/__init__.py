@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The sidebar's panels. They show what is stored and compute nothing."""
 
-from . import decimate, details, main, parts, results, settings, trust, view
+from . import chain, decimate, details, main, parts, results, settings, trust, view
 
 # Panels before their sub-panels.
 CLASSES: tuple[type, ...] = (
@@ -13,4 +13,5 @@ CLASSES: tuple[type, ...] = (
     *trust.CLASSES,
     *view.CLASSES,
     *decimate.CLASSES,
+    *chain.CLASSES,
 )

@@ -30,6 +30,11 @@ class FMQM_PT_decimate(Sidebar, bpy.types.Panel):  # noqa: N801
         number = row.row()
         number.active = decimate.limited
         number.prop(decimate, "max_triangles", text="")
+        row = layout.row(heading="Smaller Textures")
+        row.prop(decimate, "textures", text="")
+        number = row.row()
+        number.active = decimate.textures
+        number.prop(decimate, "texture_target", text="", slider=True)
         row = layout.row()
         row.operator_context = "INVOKE_DEFAULT"
         row.operator(FMQM_OT_decimate.bl_idname, icon="MOD_DECIM")

@@ -13,7 +13,7 @@ from bpy.props import (
 )
 
 from ...comparison.judge import Judge
-from .decimate import FMQMDecimate
+from .decimate import FMQMChain, FMQMDecimate
 from .items import FMQMItem, can_be_picked
 from .rows import FMQMRow
 from .settings import FMQMSettings
@@ -65,6 +65,7 @@ class FMQMScene(bpy.types.PropertyGroup):
         update=notify("judge"),
     )
     look: PointerProperty(name="Look", description="What of the chosen result is shown", type=FMQMLook)
+    chain: PointerProperty(name="LOD Chain", description="The LODs that are made of an object", type=FMQMChain)
     decimate: PointerProperty(
         name="Decimate", description="Search for the fewest triangles that are good enough", type=FMQMDecimate
     )

@@ -39,7 +39,7 @@ from fmqm_addon.metric.errors import FMQMError, MeshError, SettingsError
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.stepper import Progress, Work, finish
 from fmqm_addon.metric.surface import MeshArrays
-from fmqm_addon.ui.operators import decimate as ui_decimate
+from fmqm_addon.ui import versions as ui_versions
 from tests.blender import scenes
 from tests.blender.script import SCORE, noise, read_json, score, strict_json, write_png, write_torus
 
@@ -453,8 +453,8 @@ def during_the_search(monkeypatch: pytest.MonkeyPatch, change: Callable[[], obje
         change()
         return result
 
-    searched = ui_decimate._attempt
-    monkeypatch.setattr(ui_decimate, "_attempt", attempt)
+    searched = ui_versions.attempting
+    monkeypatch.setattr(ui_versions, "attempting", attempt)
 
 
 @pytest.mark.usefixtures("addon")
