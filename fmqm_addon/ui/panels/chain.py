@@ -8,8 +8,8 @@ from typing import ClassVar
 import bpy
 
 from ...comparison.judge import Judge
+from ...report.words import LABELS
 from ..operators.chain import FMQM_OT_lod_chain
-from ..properties.rows import EXPLAINED
 from .sidebar import Sidebar
 
 
@@ -25,7 +25,7 @@ class FMQM_PT_chain(Sidebar, bpy.types.Panel):  # noqa: N801
         layout.use_property_split, layout.use_property_decorate = True, False
         layout.prop(chain, "levels")
         column = layout.column(align=True)
-        judge = EXPLAINED[Judge[context.scene.fmqm.judge].column][0]
+        judge = LABELS[Judge[context.scene.fmqm.judge].column]
         for level in range(chain.levels):
             column.prop(chain, "qualities", index=level, text=f"{judge} of LOD{level + 1}", slider=True)
         layout.prop(chain, "name_original")

@@ -70,7 +70,7 @@ class FMQMChain(bpy.types.PropertyGroup):
         step=1,
     )
     name_original: BoolProperty(
-        name="Name Original _LOD0", description="The original's name gets the ending _LOD0, where it has it not"
+        name="Rename Original to LOD0", description="The original's name gets the ending _LOD0, where it has it not"
     )
 
 
