@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import bpy
 
-from . import operators, panels, preferences, properties, stale
+from . import live, operators, panels, preferences, properties, stale
 from .operators import measure
 from .panels import swatches
 from .properties import scene
-from .view import updates
+from .view import live_corner, updates
 
 CLASSES: tuple[type, ...] = (*preferences.CLASSES, *properties.CLASSES, *operators.CLASSES, *panels.CLASSES)
 
@@ -22,10 +22,13 @@ def register() -> None:
     swatches.register()
     stale.register()
     updates.register()
+    live_corner.register()
 
 
 def unregister() -> None:
     """The exact mirror of register."""
+    live_corner.unregister()
+    live.turn_off()
     updates.unregister()
     stale.unregister()
     swatches.unregister()

@@ -21,7 +21,7 @@ from .properties.items import item_target, kept
 from .properties.rows import row_targets
 from .view.shown import forget_removed
 
-_WATCHED = tuple(
+WATCHED = tuple(
     getattr(bpy.types, name)
     for name in (
         *("Object", "Collection", "Mesh", "Key", "Curve", "MetaBall", "Armature", "Lattice"),
@@ -100,7 +100,7 @@ def _on_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     if not scene.fmqm.rows:
         return
     for update in depsgraph.updates:
-        if isinstance(update.id, _WATCHED):
+        if isinstance(update.id, WATCHED):
             soon()
             return
 

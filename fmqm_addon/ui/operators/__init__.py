@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The sidebar's buttons."""
 
-from . import chain, decimate, inputs, measure, pick, presets, probe, results, save, screen_sizes, view
+from . import chain, decimate, inputs, live, measure, pick, presets, probe, results, save, screen_sizes, view
 
 CLASSES: tuple[type, ...] = (
     *inputs.CLASSES,
     *measure.CLASSES,
+    *live.CLASSES,
     *presets.CLASSES,
     *results.CLASSES,
     *save.CLASSES,

@@ -7,7 +7,7 @@ import bpy
 
 from ...blender.scene.target import target_of
 from ...blender.scene.triangle_count import triangle_count
-from .. import session
+from .. import live, session
 from ..operators.inputs import reference_of
 from ..operators.measure import why_not
 from ..properties.items import FMQMItem, item_target
@@ -108,10 +108,11 @@ class FMQM_PT_main(Sidebar, bpy.types.Panel):  # noqa: N801
         if finer:
             wrapped(layout, context, f"{finer} has more triangles than the original: swap them?", icon="ERROR")
         layout.prop(fmqm.settings, "preset", text="")
-        row = layout.row()
+        row = layout.split(factor=0.75, align=True)
         row.scale_y = 1.5
         row.operator_context = "INVOKE_DEFAULT"
         row.operator("fmqm.measure", icon="DRIVER_DISTANCE")
+        row.operator("fmqm.live", text="Live", depress=live.current is not None)
         reason = why_not(fmqm)
         if reason:
             wrapped(layout, context, reason, icon="INFO")
