@@ -32,7 +32,7 @@ from .properties.settings import patterns_of
 from .stale import WATCHED
 
 REST = 0.3  # seconds without a change before anything is done
-SLICE = 0.012  # seconds of work per tick: a drag stays smooth
+SLICE = 0.02  # seconds of work per tick: a drag stays smooth
 TICK = 0.01  # seconds between ticks, for Blender to draw and listen
 WAIT = 0.5  # seconds until it is tried again, while something else is measured
 MOST = 2.0  # processor seconds that a pair may take
@@ -102,12 +102,14 @@ class Live:
             self._is_due, self._is_looking = False, True
             try:
                 self._look()
+                _flush_edit_mode()
             finally:
                 self._is_looking = False
         if self._work is not None:
             self._is_working = True
             try:
                 self._slice(self._work)
+                _flush_edit_mode()
             finally:
                 self._is_working = False
         return TICK if self.is_busy and not self.is_too_slow else None
@@ -215,6 +217,12 @@ def turn_off(why: str = "") -> None:
         if why:
             bpy.app.timers.register(_forget_notice, first_interval=TOLD)
         viewport.redraw()
+
+
+def _flush_edit_mode() -> None:
+    """Reading what is being edited counts as a change of it, which would be told later, and be taken for the user's."""
+    if bpy.context.mode.startswith("EDIT"):
+        bpy.context.view_layer.update()
 
 
 def texts(scene: bpy.types.Scene) -> list[str]:
