@@ -16,6 +16,7 @@ from ...metric.errors import SettingsError
 from .. import stale
 from ..properties.settings import plain
 from ..versions import Search, VersionsOperator, hide, why_not
+from .polls import allowed
 
 
 class FMQM_OT_lod_chain(VersionsOperator, bpy.types.Operator):  # noqa: N801
@@ -31,10 +32,7 @@ class FMQM_OT_lod_chain(VersionsOperator, bpy.types.Operator):  # noqa: N801
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        reason = why_not(context)
-        if reason:
-            cls.poll_message_set(reason)
-        return not reason
+        return allowed(cls, why_not(context))
 
     def asked(self, context: bpy.types.Context, _: PairOptions, __: Reading) -> Search:
         fmqm, active = context.scene.fmqm, context.active_object

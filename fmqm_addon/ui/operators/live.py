@@ -8,6 +8,7 @@ from typing import ClassVar
 import bpy
 
 from .. import live
+from .polls import allowed
 
 
 class FMQM_OT_live(bpy.types.Operator):  # noqa: N801
@@ -21,10 +22,8 @@ class FMQM_OT_live(bpy.types.Operator):  # noqa: N801
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if live.current is None and live.chosen_pair(context.scene) is None:
-            cls.poll_message_set("Choose an original and an LOD")
-            return False
-        return True
+        there = live.current is not None or live.chosen_pair(context.scene) is not None
+        return allowed(cls, "" if there else "Choose an original and an LOD")
 
     def execute(self, _: bpy.types.Context) -> set[str]:
         if live.current is None:
