@@ -220,7 +220,7 @@ def _layers(objects: Sequence[bpy.types.Object]) -> Iterator[bpy.types.MeshUVLoo
 
 
 def _textures(objects: Sequence[bpy.types.Object]) -> list[bpy.types.Image]:
-    from ..blender.files.export import color_images
+    from ..blender.materials.color_images import color_images
 
     return color_images(list(objects))
 
