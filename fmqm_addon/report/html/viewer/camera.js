@@ -28,7 +28,9 @@ fmqmViewer.camera = (() => {
     const controls = new THREE.OrbitControls(camera, element);
     controls.zoomToCursor = true;
     controls.minDistance = 0.005;
-    controls.maxDistance = 20;
+    const middle = box.min.clone().add(box.max).multiplyScalar(0.5);
+    const reach = box.max.distanceTo(box.min);
+    controls.maxDistance = 20 * reach;
     let flight = 0;
     let aspect = 1;
     let whole = true; // all is in view, as at first: it stays so when panes change
@@ -75,7 +77,6 @@ fmqmViewer.camera = (() => {
 
     function home() {
       const place = { azimuth: (AZIMUTH * Math.PI) / 180, elevation: (ELEVATION * Math.PI) / 180, radius: 1 };
-      const center = box.min.clone().add(box.max).multiplyScalar(0.5);
       const back = cartesian(place);
       const right = new THREE.Vector3(0, 0, 1).cross(back).normalize();
       const up = back.clone().cross(right);
@@ -84,12 +85,12 @@ fmqmViewer.camera = (() => {
       for (const positions of points) {
         const step = 3 * Math.ceil(positions.length / 3 / MOST_POINTS);
         for (let k = 0; k < positions.length; k += step) {
-          at.fromArray(positions, k).sub(center);
+          at.fromArray(positions, k).sub(middle);
           const needed = at.dot(back) + distanceFor(Math.abs(at.dot(right)), Math.abs(at.dot(up)));
           place.radius = Math.max(place.radius, needed);
         }
       }
-      return [center, place];
+      return [middle, place];
     }
 
     // A place from straight in front of it, with its surroundings.
@@ -142,10 +143,10 @@ fmqmViewer.camera = (() => {
       },
       // For a pane of so many pixels, before it is drawn.
       shape(width, height) {
-        const distance = camera.position.distanceTo(controls.target);
+        const distance = camera.position.distanceTo(middle);
         camera.aspect = width / height;
-        camera.near = Math.max(distance - 2, distance / 100);
-        camera.far = distance + 2;
+        camera.far = distance + reach;
+        camera.near = Math.max(distance - reach, camera.far / 2000);
         camera.updateProjectionMatrix();
       },
       dispose() {

@@ -55,6 +55,7 @@ const fmqmViewer = (() => {
 
   return {
     ramp: "RAMP",
+    open,
     take: (path, data) => taken.set(path, data),
     // What was loaded of a pair is let go; it is loaded again when it is asked for.
     drop: (path) => [loading, taken].forEach((each) => each.delete(path)),

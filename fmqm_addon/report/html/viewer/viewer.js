@@ -171,6 +171,7 @@ fmqmViewer.show = (() => {
         element("span", { textContent: number(layer.low) }),
         bar,
         element("span", { textContent: number(layer.high) + (layer.name === "SDF_DIFFERENCE" ? " scene units" : "") }),
+        level.heat.partial ? element("span", { textContent: "dimmed: not measured" }) : "",
       );
       later();
     }
@@ -231,6 +232,7 @@ fmqmViewer.show = (() => {
         later();
       }),
       button("Reset View", () => view.reset()),
+      ...(document.fullscreenEnabled ? [button("Full Screen", () => full())] : []),
       button("Close", () => {
         close();
         place.querySelector(".viewer-open").focus();
@@ -257,6 +259,7 @@ fmqmViewer.show = (() => {
       }),
     );
     places.setAttribute("aria-label", "Worst places");
+    const full = () => (document.fullscreenElement ? document.exitFullscreen() : body.requestFullscreen());
     const body = element("div", { className: "viewer-body" }, choices, sides, stage, slider, legend, places);
     place.append(body);
     place.classList.add("viewer-shown");
@@ -269,6 +272,7 @@ fmqmViewer.show = (() => {
     const resized = new ResizeObserver(fit);
     close = () => {
       close = () => {};
+      if (document.fullscreenElement === body) document.exitFullscreen();
       resized.disconnect();
       cancelAnimationFrame(waiting);
       clearTimeout(resting);
