@@ -197,7 +197,7 @@ class _Scorer:
             findings["pictures"] = write_pair_pictures(
                 self._options.report, stem, *surfaces, result, self._options.judge
             )
-            findings["viewer"] = self._viewer(answer)
+            findings["viewer"] = self._viewer(row, stem, answer)
         if self._options.explain:
             findings["where"] = where(answer.reference, result)
         if answer.attribution is not None:
@@ -209,15 +209,17 @@ class _Scorer:
             findings["screen_size"] = size_record(sized)
         return findings
 
-    def _viewer(self, answer: PairResult) -> dict[str, str]:
+    def _viewer(self, row: Row, stem: str, answer: PairResult) -> dict[str, str]:
         """What can be turned around on the page; of the reference once for its group."""
+        from ..report.html.pictures import picture_stem
         from ..report.html.viewer.files import write_pair_data, write_reference_data
 
         folder, comparison = self._options.report, answer.comparison
         if self._reference_file is None:
-            self._reference_file = write_reference_data(folder, answer.reference)
+            own = picture_stem(row.ref_texture, row.reference)
+            self._reference_file = write_reference_data(folder, own, answer.reference)
         return write_pair_data(
-            folder, self._reference_file, comparison.distorted, comparison.result, self._options.judge
+            folder, stem, self._reference_file, comparison.distorted, comparison.result, self._options.judge
         )
 
     def _screen_sizes(self, reference: AssetMesh) -> ScreenSizes | None:

@@ -9,12 +9,14 @@ import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from chromium import Page
 from PIL import Image
 
+from fmqm_addon.report.visual.colormap import score_colors
 from tests.blender.script import SMALL, score, write_png, write_torus
 
 pytestmark = [pytest.mark.browser, pytest.mark.once]
@@ -111,6 +113,13 @@ def share_of(image: np.ndarray, color: tuple[int, int, int]) -> float:
     return float((np.abs(image - color).max(axis=2) <= 2).sum() / drawn(image).sum())
 
 
+def level_of(report: Path) -> dict[str, Any]:
+    """What the viewer is given of the LOD."""
+    (path,) = (report.parent / "viewer").glob("lod-*.js")
+    text = path.read_text(encoding="utf-8")
+    return json.loads(text[text.index("{") : text.rindex("}") + 1])
+
+
 def test_three_panes_show_the_colors_that_were_measured(page: Page, report: Path) -> None:
     show(page, report, Light="Unlit")
     original, lod, heat = (pane(page, number) for number in (1, 2, 3))
@@ -202,7 +211,17 @@ def test_pins_and_their_buttons_fly_to_the_worst_places(page: Page, report: Path
     assert page.run(place % 2) == pytest.approx([0.5, 0.5], abs=0.2)
     page.run("[...document.querySelectorAll('.viewer-pin')].find((each) => each.textContent === '1').click()")
     landed(page)
-    assert page.run(place % 1) == pytest.approx([0.5, 0.5], abs=0.2)
+    x, y = page.run(place % 1)
+    assert [x, y] == pytest.approx([0.5, 0.5], abs=0.2)
+    for label, value in (("Pins", False), ("Light", "Unlit"), ("Left", 2), ("Right", 2)):
+        choose(page, label, value)
+    page.run("document.querySelector('.viewer-handle').hidden = true")
+    image = pixels(page)
+    found = image[int(y * image.shape[0]), int(x * image.shape[1])] / 255
+    heat = level_of(report)["heat"]
+    layer = next(layer for layer in heat["layers"] if layer["name"] == "FMQM")
+    share = (heat["worst"][0]["score"] - layer["low"]) / (layer["high"] - layer["low"])
+    assert found == pytest.approx(score_colors(np.array([share]))[0], abs=0.03)  # what the patch there has
     assert page.messages == []
 
 

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import re
 from collections.abc import Mapping
@@ -38,26 +37,27 @@ class ReferenceFile:
     images: frozenset[str]
 
 
-def write_reference_data(folder: str, reference: Surface) -> ReferenceFile:
-    """Writes what the viewer shows of a reference; the same reference gives the same file.
+def write_reference_data(folder: str, stem: str, reference: Surface) -> ReferenceFile:
+    """Writes what the viewer shows of a reference, for all pairs that have it.
 
     Args:
-        folder: of the report.
+        folder: of the report. stem: by pictures.picture_stem, the reference's own.
 
     Raises:
         OutputError: it cannot be written.
     """
     data = mesh_data(reference)
-    return ReferenceFile(_write(folder, reference.name, {"mesh": data}), frozenset(data["images"]))
+    return ReferenceFile(_write(folder, stem, {"mesh": data}), frozenset(data["images"]))
 
 
 def write_pair_data(
-    folder: str, shared: ReferenceFile, distorted: Surface, result: Result, judge: Judge
+    folder: str, stem: str, shared: ReferenceFile, distorted: Surface, result: Result, judge: Judge
 ) -> dict[str, str]:
     """Writes what the viewer shows of a level: its mesh, and the heat of its comparison.
 
     Args:
-        folder: of the report. shared: of write_reference_data, of the result's reference.
+        folder: of the report. stem: by pictures.picture_stem, the pair's own.
+        shared: of write_reference_data, of the result's reference.
 
     Returns:
         What a record keeps as "viewer": paths relative to the folder.
@@ -71,7 +71,7 @@ def write_pair_data(
         "mesh": mesh_data(distorted, shared.images),
         "heat": heat_data(result, judge),
     }
-    return {"reference": shared.path, "level": _write(folder, distorted.name, data)}
+    return {"reference": shared.path, "level": _write(folder, stem, data)}
 
 
 def has_viewer_data(folder: str, viewer: Mapping[str, Any] | None) -> bool:
@@ -101,14 +101,12 @@ def write_programs(folder: str) -> None:
         write_text(os.path.join(folder, VIEWER, name), text)
 
 
-def _write(folder: str, name: str, data: Mapping[str, Any]) -> str:
-    """A script of a name for people and a digest of what it holds; returns its path."""
-    readable = re.sub(r"[^A-Za-z0-9]+", "-", Path(name).stem).strip("-")[:40] or "mesh"
-    digest = hashlib.sha256(script_text("", data).encode()).hexdigest()[:12]
-    path = f"{VIEWER}/{readable}-{digest}.js"
+def _write(folder: str, stem: str, data: Mapping[str, Any]) -> str:
+    """A script; returns its path relative to the folder."""
+    path = f"{VIEWER}/{stem}.js"
     try:
         _make_folder(folder)
-        write_text(os.path.join(folder, VIEWER, f"{readable}-{digest}.js"), script_text(path, data))
+        write_text(os.path.join(folder, VIEWER, f"{stem}.js"), script_text(path, data))
     except FileError as error:
         raise OutputError(str(error)) from error
     return path
