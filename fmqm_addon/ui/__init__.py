@@ -5,13 +5,19 @@ from __future__ import annotations
 
 import bpy
 
-from . import live, operators, panels, preferences, properties, stale
+from . import gizmos, live, operators, panels, preferences, properties, stale
 from .operators import measure
 from .panels import swatches
 from .properties import scene
 from .view import live_corner, updates
 
-CLASSES: tuple[type, ...] = (*preferences.CLASSES, *properties.CLASSES, *operators.CLASSES, *panels.CLASSES)
+CLASSES: tuple[type, ...] = (
+    *preferences.CLASSES,
+    *properties.CLASSES,
+    *operators.CLASSES,
+    *panels.CLASSES,
+    *gizmos.CLASSES,
+)
 
 
 def register() -> None:

@@ -98,39 +98,6 @@ def read_stages(text: str) -> dict[str, float] | None:
     return found if is_right else None
 
 
-@functools.lru_cache(64)
-def read_legend(text: str) -> dict[str, Any] | None:
-    """As report.visual.layers.Legend.as_dict has it."""
-    found = _read(text)
-    if not isinstance(found, dict):
-        return None
-    texts = [found.get(name) for name in ("title", "subtitle", "note")]
-    lists: list[Any] = [found.get(name) for name in ("bar", "ticks", "swatches")]
-    if not all(isinstance(each, str) for each in texts) or not all(isinstance(each, list) for each in lists):
-        return None
-    bar, ticks, swatches = lists
-    marks = [found["mark"]] if found.get("mark") else []
-    is_right = (
-        all(map(_is_color, bar))
-        and all(_is_named(each, _is_number) for each in [*ticks, *marks])
-        and all(_is_named(each, _is_color) for each in swatches)
-    )
-    return found | {"mark": marks[0] if marks else None} if is_right else None
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float))
-
-
-def _is_color(value: object) -> bool:
-    return isinstance(value, list) and len(value) == 3 and all(map(_is_number, value))
-
-
-def _is_named(value: object, is_right: Callable[[object], bool]) -> bool:
-    """Whether it is something and the text that stands beside it."""
-    return isinstance(value, list) and len(value) == 2 and is_right(value[0]) and isinstance(value[1], str)
-
-
 def _read(text: str) -> Any:
     try:
         return checked_json(text)

@@ -4,27 +4,28 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
 import pytest
+from mathutils import Euler
 
 import fmqm_addon
 from fmqm_addon.blender.display import scene_objects
 from fmqm_addon.blender.scene.bvh import BVHQuery
 from fmqm_addon.blender.scene.mesh_arrays import mesh_arrays
 from fmqm_addon.comparison.measurement import Comparison, Measurement
-from fmqm_addon.metric.colorspace import srgb_to_lab
+from fmqm_addon.metric.colorspace import decode_srgb, srgb_to_lab
 from fmqm_addon.metric.evaluation import Result, Scores
 from fmqm_addon.metric.fields import Fields
 from fmqm_addon.metric.geometry import dot
 from fmqm_addon.metric.sampling import Samples
 from fmqm_addon.metric.settings import Settings
-from fmqm_addon.metric.surface import triangle_areas
+from fmqm_addon.metric.surface import triangle_areas, triangle_normals
 from fmqm_addon.report.visual import colormap, layers
 from fmqm_addon.report.visual.heat_map import UNCOVERED
 from fmqm_addon.report.visual.shells import SHELLS, fields_at, shell_points, slice_points
@@ -34,7 +35,8 @@ from fmqm_addon.ui import session
 from fmqm_addon.ui.properties.items import is_asset
 from fmqm_addon.ui.view import heat, overlay, slice_plane
 from fmqm_addon.ui.view import shells as shell_view
-from fmqm_addon.ui.view.result import measured_row
+from fmqm_addon.ui.view.kept import grid, keep_as_objects
+from fmqm_addon.ui.view.result import measured_row, world_length, world_matrix
 from tests.blender import scenes
 
 FEW = Settings(samples=1600, patches=16)
@@ -271,7 +273,7 @@ def test_nothing_is_in_the_file(scene: bpy.types.Scene, tmp_path: Path) -> None:
         for name in layers.LAYERS:
             scene.fmqm.look.layer = name
         bpy.ops.fmqm.worst_step()
-        bpy.ops.fmqm.shells()
+        scene.fmqm.look.show_shells = scene.fmqm.look.show_slice = True
         bpy.ops.fmqm.unit_step()
         assert scenes.blocks() == before and mine.select_get() == (mine in bpy.context.selected_objects)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "after.blend"), copy=True)
@@ -398,12 +400,13 @@ def test_kept_objects_replace_those_before_and_clear_takes_all(scene: bpy.types.
         show()
         assert bpy.ops.fmqm.keep() == {"FINISHED"}
     bpy.ops.fmqm.slice()
+    bpy.ops.fmqm.shells()
+    bpy.ops.fmqm.keep()
     once = scenes.blocks()
-    assert once > before and len(list(scene_objects.objects(scene))) == 5
+    assert once > before and len(list(scene_objects.objects(scene))) == 7
     for show in (show_points, show_surface):
         show()
         bpy.ops.fmqm.keep()
-    bpy.ops.fmqm.slice()
     assert scenes.blocks() == once and bpy.context.object == mine
     assert not any(is_asset(object_) for object_ in scene_objects.objects(scene))
     assert shadings() == looks
@@ -453,34 +456,76 @@ def test_worst_places_show_only_their_patch(scene: bpy.types.Scene, measured: se
     assert patches() == set(order)
 
 
+def slice_of(scene: bpy.types.Scene) -> slice_plane.Slice:
+    found = slice_plane.shown_in(scene)
+    assert found is not None
+    return found
+
+
+def world_slice(scene: bpy.types.Scene, measured: session.Measured) -> np.ndarray:
+    """(4, 4) from the square to the world of the original."""
+    return world_matrix(measured, "REFERENCE") @ slice_of(scene).to_frame
+
+
 def test_slice_shows_the_field_where_it_is(scene: bpy.types.Scene, measured: session.Measured) -> None:
-    look = scene.fmqm.look
-    look.slice_layer, look.slice_resolution = "NCF_REFERENCE", "128"
+    """It is no object of the file, and every pixel has the color of the field at its place."""
+    look, before = scene.fmqm.look, scenes.blocks()
+    look.slice_layer = "NCF_REFERENCE"
     bpy.ops.fmqm.slice()
-    plane = scene_objects.find_object(bpy.context.scene, scene_objects.SLICE)
-    assert plane.hide_render
-
-    def pixels() -> np.ndarray:
-        values = np.empty(128 * 128 * 4, np.float32)
-        plane.data.pixels.foreach_get(values)
-        return values.reshape(-1, 4)[:, :3]
-
+    assert scenes.blocks() == before
     color = measured.comparison.result.ref.ncf[0]  # the reference has but one
-    outline = np.abs(pixels() - color).max(axis=1) > 2 / 255
-    assert 0.01 < outline.mean() < 0.2
-    look.slice_layer = "SDF_REFERENCE"
-    first = pixels()
-    plane.location.z += 0.5
-    bpy.context.view_layer.update()
-    assert slice_plane.slice_has_moved(scene)
-    slice_plane.draw_slice(scene)
-    assert not slice_plane.slice_has_moved(scene) and (pixels() != first).any()
+    outline = np.abs(slice_of(scene).picture.colors - color).max(axis=1) > 2 / 255
+    assert slice_of(scene).picture.side == 128 and 0.01 < outline.mean() < 0.2
+    look.slice_layer, look.slice_offset = "SDF_REFERENCE", 40
+    shown = slice_of(scene)
+    sdf = fields_at(measured.reference, slice_points(shown.to_frame, 128)).sdf * world_length(measured)
+    ends = layers.value_range("SDF_REFERENCE", sdf, True, world_length(measured))
+    wanted = layers.layer_colors("SDF_REFERENCE", sdf, *ends)
+    same = np.abs(shown.picture.colors - wanted).max(axis=1) < 1e-6
+    assert same.mean() > 0.9, "all but the outline"
+    bpy.ops.fmqm.slice()  # off
+    assert slice_plane.shown_in(scene) is None and not look.show_slice
 
 
-def subtitle() -> str:
-    return str(
-        json.loads(scene_objects.find_object(bpy.context.scene, scene_objects.SLICE)[overlay.LEGEND])["subtitle"]
-    )
+@pytest.mark.parametrize(("axis", "column", "normal"), [("X", 0, 1), ("Y", 1, -1), ("Z", 2, 1)])
+def test_slice_goes_through_the_box_along_its_axis(
+    scene: bpy.types.Scene, measured: session.Measured, axis: str, column: int, normal: int
+) -> None:
+    look = scene.fmqm.look
+    look.slice_axis = axis
+    bpy.ops.fmqm.slice()
+    into = world_matrix(measured, "REFERENCE")
+    vertices = measured.reference.vertices @ into[:3, :3].T + into[:3, 3]
+    low, high = vertices.min(axis=0)[column], vertices.max(axis=0)[column]
+    for offset, place in ((-100, low), (0, (low + high) / 2), (50, 0.25 * low + 0.75 * high), (100, high)):
+        look.slice_offset = offset
+        square = world_slice(scene, measured)
+        assert square[column, 3] == pytest.approx(place, abs=1e-6)
+        towards = square[:3, 2] / np.linalg.norm(square[:3, 2])
+        assert towards == pytest.approx(normal * np.eye(3)[column], abs=1e-6)
+        assert np.linalg.det(square[:3, :3]) > 0, "as it is seen from there, not mirrored"
+
+
+def test_slice_across_the_view_faces_it(scene: bpy.types.Scene, measured: session.Measured) -> None:
+    look, turn = scene.fmqm.look, Euler((0.9, 0.2, 0.5)).to_quaternion()
+    look.slice_turn, look.slice_axis = turn, "VIEW"
+    bpy.ops.fmqm.slice()
+    square = world_slice(scene, measured)[:3, :3]
+    assert square / np.linalg.norm(square, axis=0) == pytest.approx(np.array(turn.to_matrix()), abs=1e-6)
+
+
+def test_slice_is_rough_while_it_is_moved(scene: bpy.types.Scene) -> None:
+    look = scene.fmqm.look
+    bpy.ops.fmqm.slice()
+    slice_plane.moving.add(scene.name)
+    try:
+        look.slice_offset = 10
+        assert slice_of(scene).picture.side == slice_plane.ROUGH
+    finally:
+        slice_plane.moving.clear()
+    assert not slice_plane.is_current(scene)
+    slice_plane.refresh_all()
+    assert slice_of(scene).picture.side == 128
 
 
 def add_row(scene: bpy.types.Scene, measured: session.Measured, name: str) -> None:
@@ -505,26 +550,33 @@ def test_all_follows_the_chosen_row(scene: bpy.types.Scene, measured: session.Me
     bpy.ops.fmqm.unit_step()
     add_row(scene, measured, "Other")
     scene.fmqm.row_index = 1
-    titles = [legend()["subtitle"], subtitle(), shells_of(scene).legend["title"]]
+    titles = [legend()["subtitle"], slice_of(scene).legend["subtitle"], shells_of(scene).legend["title"]]
     assert all("Other" in text for text in titles)
     assert overlay.figure is not None and overlay.figure.uid == "Other"
     scene.fmqm.rows.add().error = "broken"
     scene.fmqm.row_index = 2  # nothing to follow
-    assert heat.shown_in(scene) is None and subtitle() == "Other"
+    assert heat.shown_in(scene) is slice_plane.shown_in(scene) is shell_view.shown_in(scene) is None
 
 
 def shells_of(scene: bpy.types.Scene) -> shell_view.Shells:
-    return shell_view.shown[scene.name]
+    found = shell_view.shown_in(scene)
+    assert found is not None
+    return found
 
 
-def test_all_but_the_slice_follows_the_place(scene: bpy.types.Scene) -> None:
+def test_all_follows_the_place(scene: bpy.types.Scene) -> None:
     show_all()
     bpy.ops.fmqm.unit_step()
-    lines, plane = overlay.figure.lines, scene_objects.find_object(scene, scene_objects.SLICE)
-    before = shells_of(scene).matrix.translation.x, plane.location.x
+    lines, view = overlay.figure.lines, SimpleNamespace(local_view=None)
+
+    def slices() -> list[float]:
+        return [matrix.translation.x for matrix in slice_plane.placed(scene, slice_of(scene), view)]
+
+    before, stood = shell_view.matrix_of(scene, shells_of(scene)).translation.x, slices()
+    assert np.subtract(*reversed(stood)) == pytest.approx(10, abs=1e-5), "on both, as the heat map"
     scene.fmqm.look.place = "COMPARED"
-    after = shells_of(scene).matrix.translation.x, plane.location.x
-    assert np.subtract(after, before) == pytest.approx([10, 0], abs=1e-5)
+    after = shell_view.matrix_of(scene, shells_of(scene)).translation.x
+    assert after - before == pytest.approx(10, abs=1e-5) and slices() == stood[1:]
     assert overlay.figure.lines == pytest.approx(lines + (10, 0, 0))
 
 
@@ -544,17 +596,18 @@ def test_worst_places_are_the_chosen_rows(scene: bpy.types.Scene, measured: sess
 
 def test_each_scene_shows_its_own(scene: bpy.types.Scene, measured: session.Measured) -> None:
     show_all()
-    mine = scene_objects.find_object(scene, scene_objects.SLICE)
+    mine = slice_of(scene)
     two = bpy.data.scenes.new("Two")
     add_row(two, measured, "Other")
-    two.fmqm.look.show = "POINTS"
-    slice_plane.show_slice(two)
-    assert scene_objects.find_object(scene, scene_objects.SLICE) == mine and subtitle() == "Monkey_LOD1"
+    two.fmqm.look.show, two.fmqm.look.show_slice = "POINTS", True
+    assert slice_of(scene) is mine and slice_of(two).uid == "Other"
     assert drawn().uid == "row" and heat.shown_in(two).uid == "Other"
-    (theirs,) = scene_objects.objects(two)
-    assert theirs != mine and len(theirs.users_scene) == len(mine.users_scene) == 1
+    keep_as_objects(scene)
+    keep_as_objects(two)
+    theirs = {object_.name for object_ in scene_objects.objects(two)}
+    assert len(theirs) == 4 and not theirs & {object_.name for object_ in scene_objects.objects(scene)}
     bpy.ops.fmqm.clear()
-    assert not scene_objects.anything() and heat.shown_in(two) is None
+    assert not scene_objects.anything() and heat.shown_in(two) is slice_plane.shown_in(two) is None
 
 
 def test_what_was_hidden_is_shown_when_asked_for(scene: bpy.types.Scene) -> None:
@@ -587,30 +640,34 @@ def test_what_was_hidden_is_shown_when_asked_for(scene: bpy.types.Scene) -> None
         assert cloud.visible_get(), hide
 
 
-def test_slice_is_in_the_saved_file(scene: bpy.types.Scene, tmp_path: Path) -> None:
+def test_kept_slice_and_shells_look_as_drawn(scene: bpy.types.Scene, measured: session.Measured) -> None:
+    scene.fmqm.look.slice_offset = 30
     bpy.ops.fmqm.slice()
+    bpy.ops.fmqm.shells()
+    assert bpy.ops.fmqm.keep() == {"FINISHED"}
+    plane = scene_objects.find_object(scene, scene_objects.SLICE)
+    points = slice_points(slice_of(scene).to_frame, 128)
+    into = world_matrix(measured, "REFERENCE")
+    stand = np.array([plane.matrix_world @ vertex.co for vertex in plane.data.vertices])
+    assert stand == pytest.approx(points @ into[:3, :3].T + into[:3, 3], abs=1e-5)
+    colors = np.empty(4 * len(stand), np.float32)
+    plane.data.attributes[scene_objects.COLOR].data.foreach_get("color", colors)
+    assert colors.reshape(-1, 4)[:, :3] == pytest.approx(decode_srgb(slice_of(scene).picture.colors), abs=1e-6)
+    shells = scene_objects.find_object(scene, scene_objects.SHELLS)
+    assert len(shells.data.vertices) == 4 * len(shells_of(scene).positions)
 
-    def pixels() -> list[float]:
-        return list(scene_objects.find_object(bpy.context.scene, scene_objects.SLICE).data.pixels)
 
-    for height in (0.0, 0.3):  # a picture that was packed can be drawn again
-        scene_objects.find_object(scene, scene_objects.SLICE).location.z = height
-        bpy.context.view_layer.update()
-        slice_plane.draw_slice(scene)
-        before = pixels()
-        path = str(tmp_path / f"{height}.blend")
-        bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
-        with bpy.data.libraries.load(path) as (_, into):
-            into.images = ["FMQM Slice"]
-        assert list(into.images[0].pixels) == before and len(set(before)) > 3
-        bpy.data.images.remove(into.images[0])
+def test_grids_face_as_their_square() -> None:
+    points, triangles = slice_points(np.eye(4), 3), grid(3)
+    assert len(triangles) == 8 and triangle_areas(points, triangles).sum() == pytest.approx((2 / 3) ** 2)
+    assert triangle_normals(points, triangles) == pytest.approx(np.tile([0, 0, 1], (8, 1)))
 
 
 def test_lengths_of_the_shells_have_the_scenes_unit(scene: bpy.types.Scene) -> None:
     bpy.ops.fmqm.shells()
     assert shells_of(scene).legend["subtitle"].endswith(" cm apart")
     scene.unit_settings.system = "NONE"
-    bpy.ops.fmqm.shells()
+    shell_view.refresh(scene)
     assert float(shells_of(scene).legend["subtitle"].removesuffix(" apart")) > 0
 
 
@@ -639,6 +696,8 @@ def test_without_samples_it_says_measure_again(scene: bpy.types.Scene) -> None:
     session.clear()
     scene.fmqm.look.layer = "PATCH"  # no error: there is nobody to tell
     assert heat.shown_in(scene) is None
+    scene.fmqm.look.show_slice = scene.fmqm.look.show_shells = True
+    assert slice_plane.shown_in(scene) is shell_view.shown_in(scene) is None
     assert not bpy.ops.fmqm.keep.poll() and not bpy.ops.fmqm.slice.poll()
     with pytest.raises(fmqm_addon.metric.errors.FMQMError, match="press Measure Quality again"):
         measured_row(scene)

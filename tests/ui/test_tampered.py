@@ -17,8 +17,6 @@ from fmqm_addon.ui import stale
 from fmqm_addon.ui.panels import results as panels
 from fmqm_addon.ui.panels import trust
 from fmqm_addon.ui.properties.rows import is_whole
-from fmqm_addon.ui.stored_text import read_legend
-from fmqm_addon.ui.view import overlay
 from tests.blender import scenes
 from tests.blender.script import read_json
 
@@ -105,24 +103,3 @@ def test_a_choice_beyond_the_rows_removes_none(rows: bpy.types.bpy_prop_collecti
     draw()
     assert bpy.ops.fmqm.remove_row() == {"FINISHED"} and len(rows) == count
     assert fmqm.row_index == count - 1
-
-
-def test_a_broken_legend_is_none() -> None:
-    right = {"title": "a", "subtitle": "b", "note": "", "bar": [[0, 0.5, 1]], "ticks": [[0, "0"]], "swatches": []}
-    assert read_legend(json.dumps(right | {"mark": [0.5, "0.9"]})) == right | {"mark": [0.5, "0.9"]}
-    for wrong in ({"title": 1}, {"bar": [[0, 1]]}, {"ticks": [0]}, {"swatches": [[["r", 0, 0], "a"]]}, {"mark": 3}):
-        assert read_legend(json.dumps(right | wrong)) is None
-    assert all(read_legend(text) is None for text in BROKEN)
-
-
-@pytest.mark.parametrize("value", ["{", 7, {"a": 1}])
-def test_an_object_with_a_broken_legend_draws_none(
-    rows: bpy.types.bpy_prop_collection, value: object, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    bpy.context.scene.fmqm.look.show = "OFF"
-    tagged = bpy.data.objects["Rock_LOD1"]
-    tagged[overlay.LEGEND] = value
-    monkeypatch.setattr(overlay.scene_objects, "objects", lambda scene: [tagged])
-    monkeypatch.setattr(overlay.bpy, "context", SimpleNamespace(scene=bpy.context.scene, space_data=None))
-    assert overlay.legends() == []
-    del tagged[overlay.LEGEND]

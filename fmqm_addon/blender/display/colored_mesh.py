@@ -89,7 +89,7 @@ class ColoredMesh:
         gpu.state.depth_mask_set(True)
         try:
             shader.bind()
-            shader.uniform_float("matrix", _clip_matrix(region_3d, nearer) @ region_3d.view_matrix @ matrix)
+            shader.uniform_float("matrix", clip_matrix(region_3d, nearer) @ region_3d.view_matrix @ matrix)
             shader.uniform_float("towards", _towards(region_3d, matrix))
             shader.uniform_sampler("table", self._table)
             self._batch.draw(shader)
@@ -104,7 +104,7 @@ def from_faces(vertices: Array, triangles: Array, entry: Array) -> ColoredMesh:
     return ColoredMesh(corners, np.arange(len(corners)).reshape(-1, 3), np.repeat(entry, 3))
 
 
-def _clip_matrix(region_3d: Any, nearer: float) -> Matrix:
+def clip_matrix(region_3d: Any, nearer: float = SAME) -> Matrix:
     """From the view to the screen, a little nearer to the viewer."""
     moved = Matrix.Scale(1 - nearer, 4)
     if not region_3d.is_perspective:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the add-on shows in the scene, made from arrays: points and surfaces with a color at every place.
+"""What the add-on puts into the scene where it is asked to keep it, made from arrays: points and surfaces with a color
+at every place.
 
 Points are small tetrahedra in one mesh: Solid shading draws point clouds grey and loose vertices black.
 Everything is tagged, so that a second one replaces the first and clear() finds it whatever its name.
@@ -21,7 +22,8 @@ from .. import arrays
 TAG = "fmqm"  # custom property of every data-block of ours: what it is for
 COLLECTION = "FMQM"
 COLOR = "FMQM"  # name of the color attribute
-CLOUD, CLOUD_LOD, PAINTED, PAINTED_LOD, SLICE = "cloud", "cloud lod", "painted", "painted lod", "slice"
+CLOUD, CLOUD_LOD, PAINTED, PAINTED_LOD = "cloud", "cloud lod", "painted", "painted lod"
+SLICE, SLICE_LOD, SHELLS = "slice", "slice lod", "shells"
 
 # A regular tetrahedron around the origin, of radius 1, its faces outwards.
 _CORNERS = np.array([(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)], np.float32) / np.sqrt(np.float32(3))
@@ -29,7 +31,7 @@ _FACES = np.array([(0, 1, 2), (0, 3, 1), (0, 2, 3), (1, 3, 2)], np.int32)
 
 
 def objects(scene: bpy.types.Scene) -> Iterator[bpy.types.Object]:
-    """Our objects in a scene; asked at each drawing, so it looks at few objects."""
+    """Our objects in a scene."""
     return (object_ for collection in _collections(scene) for object_ in collection.objects)
 
 
@@ -84,39 +86,6 @@ def tetrahedra(positions: Floats, size: float) -> tuple[NDArray[np.float32], NDA
     corners = positions.astype(np.float32)[:, None, :] + np.float32(size) * _CORNERS
     first = 4 * np.arange(len(positions), dtype=np.int32)
     return corners, (first[:, None, None] + _FACES).reshape(-1, 3)
-
-
-def build_slice(scene: bpy.types.Scene, name: str, matrix: Floats, resolution: int) -> bpy.types.Object:
-    """An image empty, a square of side 1 in its own X and Y; one that is there is kept where it is.
-
-    Blender draws image empties in every shading, unlit.
-    """
-    object_ = find_object(scene, SLICE)
-    if object_ is None:
-        object_ = bpy.data.objects.new(name, None)
-        object_[TAG] = SLICE
-        object_.empty_display_type = "IMAGE"
-        object_.empty_display_size = 1.0
-        object_.hide_render = True
-        object_.matrix_world = Matrix(matrix.tolist())
-    image = object_.data
-    if image is None or tuple(image.size) != (resolution, resolution):
-        object_.data = bpy.data.images.new(name, resolution, resolution, alpha=True)
-        object_.data[TAG] = SLICE
-        if image is not None:
-            bpy.data.images.remove(image)
-            object_.data.name = name  # the name was the old image's until now
-    _link(scene, object_)
-    return object_
-
-
-def draw_slice(object_: bpy.types.Object, colors: Floats) -> None:
-    """Writes (resolution^2, 3) encoded colors, rows upwards, into the image of a slice."""
-    pixels = np.ones((len(colors), 4), np.float32)
-    pixels[:, :3] = colors
-    arrays.write_pixels(object_.data, pixels)
-    object_.data.update()
-    object_.data.pack()  # else it is black when the file is opened again
 
 
 def reveal(object_: bpy.types.Object, layer: bpy.types.ViewLayer) -> None:

@@ -9,7 +9,7 @@ import bpy
 from bpy.props import IntProperty
 
 from ...metric.errors import FMQMError
-from ..view import heat, kept, shells, shown, slice_plane, units, worst
+from ..view import heat, kept, shown, units, worst
 from ..view.result import look_of, measured_row
 from .polls import allowed, no_samples
 
@@ -39,14 +39,17 @@ class FMQM_OT_keep(ShowOperator, bpy.types.Operator):  # noqa: N801 Blender's na
     bl_idname = "fmqm.keep"
     bl_label = "Keep as Objects"
     bl_description = (
-        "Make objects of what is shown, for renders and export: their material glows in the colors. "
+        "Make objects of what is shown, the slice and the shells too, for renders and export: their material glows "
+        "in the colors. "
         "Solid shading shows these by Color > Attribute. Clear View removes them"
     )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        is_off = look_of(context.scene).show == heat.OFF
-        return allowed(cls, "Choose Surface or Points first" if is_off else no_samples(context))
+        look = look_of(context.scene)
+        is_off = look.show == heat.OFF and not look.show_slice and not look.show_shells
+        why = "Choose Surface or Points first, a slice or shells" if is_off else no_samples(context)
+        return allowed(cls, why)
 
     def act(self, context: bpy.types.Context) -> None:
         kept.keep_as_objects(context.scene)
@@ -94,16 +97,18 @@ class FMQM_OT_shells(ShowOperator, bpy.types.Operator):  # noqa: N801
     bl_description = "Show the color field (NCF) in five layers of points at growing distances from the surface"
 
     def act(self, context: bpy.types.Context) -> None:
-        shells.show_shells(context.scene)
+        look = look_of(context.scene)
+        look.show_shells = not look.show_shells
 
 
 class FMQM_OT_slice(ShowOperator, bpy.types.Operator):  # noqa: N801
     bl_idname = "fmqm.slice"
     bl_label = "Show Slice"
-    bl_description = "Add a plane on which the fields are drawn; move, turn or scale it and it is drawn again"
+    bl_description = "Show a plane through the original and the LOD on which a field is drawn, or hide it"
 
     def act(self, context: bpy.types.Context) -> None:
-        slice_plane.show_slice(context.scene)
+        look = look_of(context.scene)
+        look.show_slice = not look.show_slice
 
 
 class FMQM_OT_unit_step(ShowOperator, bpy.types.Operator):  # noqa: N801

@@ -105,17 +105,21 @@ class FMQM_PT_ncf(OfResult, bpy.types.Panel):  # noqa: N801
         row.operator(FMQM_OT_unit_step.bl_idname, text="Previous", icon="TRIA_LEFT").step = -1
         row.operator(FMQM_OT_unit_step.bl_idname, text="Next", icon="TRIA_RIGHT").step = 1
         column = layout.column()
-        column.label(text="Slice")
+        column.operator(FMQM_OT_slice.bl_idname, icon="MESH_PLANE", depress=look.show_slice)
+        column = column.column()
+        column.active = look.show_slice
+        column.row().prop(look, "slice_axis", expand=True)
+        column.prop(look, "slice_offset", slider=True)
         column.prop(look, "slice_layer")
         column.prop(look, "slice_resolution")
-        column.operator(FMQM_OT_slice.bl_idname, icon="MESH_PLANE")
         column = layout.column()
-        column.label(text="Shells")
+        column.operator(FMQM_OT_shells.bl_idname, icon="MOD_THICKNESS", depress=look.show_shells)
+        column = column.column()
+        column.active = look.show_shells
         column.row().prop(look, "shell_field", expand=True)
         column.row().prop(look, "shell_layout", expand=True)
         column.prop(look, "shell_distance")
         column.prop(look, "shell_points")
-        column.operator(FMQM_OT_shells.bl_idname, icon="MOD_THICKNESS")
 
 
 def _switch(layout: bpy.types.UILayout, look: Any, name: str) -> None:

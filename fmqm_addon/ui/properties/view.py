@@ -11,6 +11,7 @@ from bpy.props import (
     CollectionProperty,
     EnumProperty,
     FloatProperty,
+    FloatVectorProperty,
     IntProperty,
     StringProperty,
 )
@@ -31,6 +32,14 @@ def notify(name: str) -> Callable[[bpy.types.PropertyGroup, bpy.types.Context], 
             on_change(group.id_data, name, context)
 
     return update
+
+
+def _take_view(look: FMQMLook, context: bpy.types.Context) -> None:
+    """The slice turns to its axis, or to how the view looks that was clicked in."""
+    space = context.space_data
+    if look.slice_axis == "VIEW" and space is not None and space.type == "VIEW_3D":
+        look.slice_turn = space.region_3d.view_rotation
+    notify("slice_place")(look, context)
 
 
 class FMQMWorstPatch(bpy.types.PropertyGroup):
@@ -111,9 +120,13 @@ class FMQMLook(bpy.types.PropertyGroup):
     )
     worst_uid: StringProperty(name="Row", description="Which result the worst places belong to")
     focused: BoolProperty(name="One Patch Only", description="Only one patch is shown", default=False)
+    show_shells: BoolProperty(
+        name="Shells", description="The shells are drawn over the view", default=False, update=notify("shells")
+    )
     shell_field: EnumProperty(
         name="Surface",
         description="Whose colors the shells show",
+        update=notify("shells"),
         items=[
             ("REFERENCE", "Original", "Colors of the original around it"),
             ("COMPARED", "LOD", "Colors of the LOD around it"),
@@ -122,6 +135,7 @@ class FMQMLook(bpy.types.PropertyGroup):
     shell_layout: EnumProperty(
         name="Layout",
         description="How the five shells are arranged",
+        update=notify("shells"),
         items=[
             ("PEELED", "Peeled", "Around the surface, each one ending before the one below it"),
             ("ROW", "In a Row", "Side by side, as in the paper's figure"),
@@ -131,13 +145,39 @@ class FMQMLook(bpy.types.PropertyGroup):
         name="Distance",
         description="Between two shells, in percent of the original's size",
         default=2.0, min=0.001, max=100.0, soft_max=10.0, step=10, precision=2, subtype="PERCENTAGE",
+        update=notify("shells"),
     )  # fmt: skip
     shell_points: IntProperty(
-        name="Points", description="Points of each shell", default=30_000, min=100, max=2_000_000, soft_max=200_000
-    )
+        name="Points", description="Points of each shell", default=30_000, min=100, max=2_000_000, soft_max=200_000,
+        update=notify("shells"),
+    )  # fmt: skip
     unit_sample: IntProperty(name="Sample", description="The sample whose units are shown", default=0, min=0)
+    show_slice: BoolProperty(
+        name="Slice", description="The slice is drawn over the view", default=False, update=notify("slice")
+    )
     slice_layer: EnumProperty(
-        name="Field", description="What is drawn on the slice", items=_FIELD_ITEMS, update=notify("slice_layer")
+        name="Field", description="What is drawn on the slice", items=_FIELD_ITEMS, update=notify("slice")
+    )
+    slice_axis: EnumProperty(
+        name="Across",
+        description="What the slice stands across",
+        items=[
+            ("X", "X", "Across the X axis: seen from the right"),
+            ("Y", "Y", "Across the Y axis: seen from the front"),
+            ("Z", "Z", "Across the Z axis: seen from above"),
+            ("VIEW", "View", "Across the view as it is when this is clicked"),
+        ],
+        default="Y",
+        update=_take_view,
+    )
+    slice_offset: FloatProperty(
+        name="Offset",
+        description="From the middle of the original to its ends; the arrow in the view drags it too",
+        default=0.0, min=-100.0, max=100.0, step=100, precision=1, subtype="PERCENTAGE",
+        update=notify("slice_place"),
+    )  # fmt: skip
+    slice_turn: FloatVectorProperty(
+        name="Turn", description="How the view was turned", size=4, default=(1, 0, 0, 0), subtype="QUATERNION"
     )
     slice_resolution: EnumProperty(
         name="Resolution",
@@ -149,7 +189,7 @@ class FMQMLook(bpy.types.PropertyGroup):
             ("512", "512", "Very fine; slow to move"),
         ],
         default="128",
-        update=notify("slice_resolution"),
+        update=notify("slice"),
     )
 
 

@@ -16,11 +16,9 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
-from ...blender.display import viewport
 from ...blender.display.colored_mesh import SAME, SIMILAR, ColoredMesh, from_faces
 from ...blender.display.scene_objects import tetrahedra
 from ...blender.scene.triangle_count import triangle_count
-from ...metric.errors import FMQMError
 from ...metric.evaluation import Result
 from ...metric.fields import Fields
 from ...metric.geometry import Floats, Ints
@@ -31,11 +29,13 @@ from ...report.visual.heat_map import UNCOVERED, HeatMesh, fitted_range, heat_me
 from ...report.visual.shells import fields_at
 from .. import session
 from ..properties.rows import FMQMRow, active_row, row_targets
+from .built import Built
 from .legends import legend_of
-from .result import POINT, look_of, measured_row, world_length, world_matrix
+from .result import POINT, look_of, measured_row, showable, world_length, world_matrix
 
 OFF, SURFACE, POINTS = "OFF", "SURFACE", "POINTS"
 ORIGINAL, LOD, BOTH = "REFERENCE", "COMPARED", "BOTH"
+PLACES = {ORIGINAL: (ORIGINAL,), LOD: (LOD,), BOTH: (ORIGINAL, LOD)}
 
 
 @dataclass
@@ -72,13 +72,10 @@ class Shown:
     fields: dict[int, Any] = field(default_factory=dict)
 
 
-_shown: dict[str, Shown] = {}  # by the scene's name
-
-
 def wanted(scene: bpy.types.Scene) -> tuple[Any, ...] | None:
     """The choices that decide what is drawn; None: nothing is to be. Cheap: it is asked at each drawing."""
-    look, row = look_of(scene), active_row(scene)
-    if look.show == OFF or row is None or row.uid in session.stale or session.get(row.uid) is None:
+    look, row = look_of(scene), showable(scene)
+    if look.show == OFF or row is None:
         return None
     size = look.point_size if look.show == POINTS else 0.0
     rows = tuple(each.uid for each in scene.fmqm.rows)
@@ -93,45 +90,13 @@ def focused_patch(scene: bpy.types.Scene) -> int | None:
     return look.worst[look.worst_index].patch if look.focused and look.worst_index < len(look.worst) else None
 
 
-def is_current(scene: bpy.types.Scene) -> bool:
-    """Whether what was built is what is wanted."""
-    shown = _shown.get(scene.name)
-    return wanted(scene) == (None if shown is None else shown.key)
-
-
-def shown_in(scene: bpy.types.Scene) -> Shown | None:
-    """What is drawn in a scene now."""
-    shown = _shown.get(scene.name)
-    row = active_row(scene)
-    return shown if shown is not None and row is not None and row.uid == shown.uid and is_current(scene) else None
-
-
-def refresh(scene: bpy.types.Scene) -> None:
-    """Builds what is wanted, from what is there already where that fits."""
-    key = wanted(scene)
-    if key is None:
-        _shown.pop(scene.name, None)
-    elif not is_current(scene):
-        _shown[scene.name] = _build(scene, key, _shown.get(scene.name))
-    viewport.redraw()
-
-
-def keep(uids: set[str]) -> None:
-    """Lets go of what belongs to other rows."""
-    for name, shown in list(_shown.items()):
-        if shown.uid not in uids:
-            del _shown[name]
-
-
 def _build(scene: bpy.types.Scene, key: tuple[Any, ...], before: Shown | None) -> Shown:
     uid, _, measured = measured_row(scene)
     look, result = look_of(scene), measured.comparison.result
-    places = [ORIGINAL, LOD] if look.place == BOTH else [look.place]
-    if look.show == POINTS and np.array_equal(measured.reference_to_world, measured.distorted_to_world):
-        places = places[:1]
+    where = places(scene, measured) if look.show == POINTS else PLACES[look.place]
     old = before if before is not None and (before.uid, before.show) == (uid, look.show) else None
     reusable = {part.place: part for part in old.parts} if old is not None else {}
-    parts = tuple(_part(look, measured, place, reusable.get(place)) for place in places)
+    parts = tuple(_part(look, measured, place, reusable.get(place)) for place in where)
     layer, length = layers.LAYERS[look.layer], world_length(measured)
     values = layers.patch_values(result, look.layer) if layer.per_patch else None
     fields = old.fields if old is not None else {}
@@ -153,6 +118,19 @@ def _build(scene: bpy.types.Scene, key: tuple[Any, ...], before: Shown | None) -
         counts = histogram(values, *ends)
         legend["histogram"] = (counts / max(int(counts.max()), 1)).tolist()
     return Shown(key, uid, look.show, look.layer, parts, ends, legend, values, fields)
+
+
+# Their state, scene by scene.
+_built: Built[Shown] = Built(wanted, _build)
+is_current, shown_in, refresh = _built.is_current, _built.shown_in, _built.refresh
+build_all, keep = _built.refresh_all, _built.keep
+
+
+def places(scene: bpy.types.Scene, measured: session.Measured) -> tuple[str, ...]:
+    """Where the look wants things; the original alone, where the LOD was measured at the same place."""
+    where = PLACES[look_of(scene).place]
+    same = np.array_equal(measured.reference_to_world, measured.distorted_to_world)
+    return where[:1] if same else where
 
 
 def seen_patches(scene: bpy.types.Scene, values: Floats | None) -> NDArray[np.bool_]:
@@ -295,12 +273,3 @@ def legends(scene: bpy.types.Scene, space: Any) -> Iterator[dict[str, Any]]:
     shown = shown_in(scene)
     if shown is not None and shown.legend is not None and is_drawn_in(space):
         yield shown.legend
-
-
-def build_all() -> None:
-    """Brings what is drawn up to date in all scenes."""
-    for scene in bpy.data.scenes:
-        try:
-            refresh(scene)
-        except FMQMError:
-            _shown.pop(scene.name, None)

@@ -1,24 +1,29 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The heat map as objects of the file, for renders and export."""
+"""What is drawn over the view as objects of the file, for renders and export."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator
 
 import bpy
 import numpy as np
 
 from ...blender.display import scene_objects, viewport
+from ...blender.display.scene_objects import CLOUD, CLOUD_LOD, PAINTED, PAINTED_LOD, SHELLS, SLICE, SLICE_LOD
 from ...metric.errors import FMQMError
 from ...metric.fields import Fields
-from ...metric.geometry import Floats, cross
+from ...metric.geometry import Floats, Ints, cross
 from ...report.visual import layers
 from ...report.visual.heat_map import HeatMesh
-from ...report.visual.shells import fields_at
+from ...report.visual.shells import fields_at, slice_points
 from .. import session
-from . import heat
+from . import heat, shells, slice_plane
 from .result import measured_row, world_length, world_matrix
 
 LIFT = 0.002  # a painted copy lies this much above the surface, in diagonals, so as not to flicker
-_KINDS = {heat.ORIGINAL: scene_objects.PAINTED, heat.LOD: scene_objects.PAINTED_LOD}
+_CLOUDS = {heat.ORIGINAL: CLOUD, heat.LOD: CLOUD_LOD}
+_SURFACES = {heat.ORIGINAL: PAINTED, heat.LOD: PAINTED_LOD}
+_SLICES = {heat.ORIGINAL: SLICE, heat.LOD: SLICE_LOD}
 
 
 def keep_as_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
@@ -27,12 +32,12 @@ def keep_as_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     Raises:
         FMQMError: nothing is shown.
     """
-    heat.refresh(scene)
-    shown = heat.shown_in(scene)
-    if shown is None:
-        raise FMQMError("nothing is shown; choose Surface or Points first")
+    for refresh in (heat.refresh, slice_plane.refresh, shells.refresh):
+        refresh(scene)
     _, _, measured = measured_row(scene)
-    made = [_object(scene, shown, part, measured) for part in shown.parts]
+    made = [*_heat(scene, measured), *_slices(scene, measured), *_shells(scene, measured)]
+    if not made:
+        raise FMQMError("nothing is shown; choose Surface or Points first, a slice or shells")
     bpy.context.view_layer.update()
     for object_ in made:
         scene_objects.reveal(object_, bpy.context.view_layer)
@@ -40,21 +45,53 @@ def keep_as_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     return made
 
 
-def _object(scene: bpy.types.Scene, shown: heat.Shown, part: heat.Part, measured: session.Measured) -> bpy.types.Object:
-    matrix = world_matrix(measured, part.place)
-    result = measured.comparison.result
-    if part.heat_mesh is None:
-        positions, normals = result.samples.positions, outwards(result.samples.positions, result.ref)
-        seen = part.mesh.colors[:, 3] > 0
-        kind = scene_objects.CLOUD if part.place == heat.ORIGINAL else scene_objects.CLOUD_LOD
-        made = scene_objects.build_cloud(scene, kind, "FMQM Points", positions[seen], normals[seen], matrix, part.size)
-        scene_objects.recolor(made, part.mesh.colors[seen, :3].astype(np.float64))
-        return made
-    mesh = part.heat_mesh
-    vertices = mesh.vertices + LIFT * _vertex_normals(mesh)
-    made = scene_objects.build_surface(scene, _KINDS[part.place], "FMQM Surface", vertices, mesh.triangles, matrix)
-    scene_objects.recolor(made, _vertex_colors(shown, part, mesh, measured))
-    return made
+def _heat(scene: bpy.types.Scene, measured: session.Measured) -> Iterator[bpy.types.Object]:
+    shown, result = heat.shown_in(scene), measured.comparison.result
+    if shown is None:
+        return
+    for part in shown.parts:
+        matrix = world_matrix(measured, part.place)
+        if part.heat_mesh is None:
+            seen, positions = part.mesh.colors[:, 3] > 0, result.samples.positions
+            normals, kind = outwards(positions, result.ref)[seen], _CLOUDS[part.place]
+            made = scene_objects.build_cloud(scene, kind, "FMQM Points", positions[seen], normals, matrix, part.size)
+            scene_objects.recolor(made, part.mesh.colors[seen, :3].astype(np.float64))
+        else:
+            mesh, kind = part.heat_mesh, _SURFACES[part.place]
+            vertices = mesh.vertices + LIFT * _vertex_normals(mesh)
+            made = scene_objects.build_surface(scene, kind, "FMQM Surface", vertices, mesh.triangles, matrix)
+            scene_objects.recolor(made, _vertex_colors(shown, part, mesh, measured))
+        yield made
+
+
+def _slices(scene: bpy.types.Scene, measured: session.Measured) -> Iterator[bpy.types.Object]:
+    """Grids with a vertex in the middle of each pixel."""
+    shown = slice_plane.shown_in(scene)
+    if shown is None:
+        return
+    points, triangles = slice_points(shown.to_frame, shown.picture.side), grid(shown.picture.side)
+    for place in heat.places(scene, measured):
+        matrix, kind = world_matrix(measured, place), _SLICES[place]
+        made = scene_objects.build_surface(scene, kind, "FMQM Slice", points, triangles, matrix)
+        scene_objects.recolor(made, shown.picture.colors)
+        yield made
+
+
+def _shells(scene: bpy.types.Scene, measured: session.Measured) -> Iterator[bpy.types.Object]:
+    shown = shells.shown_in(scene)
+    if shown is None:
+        return
+    matrix = world_matrix(measured, shells.place_of(scene))
+    made = scene_objects.build_cloud(scene, SHELLS, "FMQM Shells", shown.positions, shown.normals, matrix, shown.size)
+    scene_objects.recolor(made, shown.mesh.colors[:, :3].astype(np.float64))
+    yield made
+
+
+def grid(side: int) -> Ints:
+    """(2 (side - 1)^2, 3) triangles between side * side vertices, row after row."""
+    first = (np.arange(side - 1)[:, None] * side + np.arange(side - 1)).ravel()
+    corners = np.stack([first, first + 1, first + side + 1, first, first + side + 1, first + side], axis=1)
+    return corners.reshape(-1, 3)
 
 
 def _vertex_colors(shown: heat.Shown, part: heat.Part, mesh: HeatMesh, measured: session.Measured) -> Floats:

@@ -1,31 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Legends, stored on the objects that they explain."""
+"""Legends as the view draws them."""
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import bpy
 
 from ...metric.evaluation import Result
 from ...report.visual import layers
-
-LEGEND = "fmqm_legend"  # custom property of the objects that have a legend: report.visual.layers.Legend as JSON
-
-
-def explain(
-    scene: bpy.types.Scene,
-    object_: bpy.types.Object,
-    layer: str,
-    ends: tuple[float, float],
-    result: Result,
-    name: str,
-    note: str = "",
-) -> None:
-    """Stores the legend on the object, where drawing, saving and undo find it."""
-    legend = legend_of(scene, layer, ends, result, name)
-    object_[LEGEND] = json.dumps(legend | {"note": note or legend["note"]})
 
 
 def legend_of(

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What is drawn over the 3D viewport: legends, the figure of a sample's units, and a mark at the sample.
 
-Drawing computes nothing: legends are stored on the objects that they explain, a figure is made by its operator.
+Drawing computes nothing: what is drawn was built before, a figure is made by its operator.
 """
 
 from __future__ import annotations
@@ -16,14 +16,11 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 from numpy.typing import NDArray
 
-from ...blender.display import scene_objects
 from ...metric.geometry import Floats
 from .. import session
 from ..properties.rows import active_row
-from ..stored_text import read_legend
-from . import heat, shells
+from . import heat, shells, slice_plane
 from .ink import Ink, box, draw_shape, free_corner
-from .legends import LEGEND
 
 _PAD, _LINE, _GAP = 10, 17, 8  # pixels at a UI scale of 1
 _BAR_WIDTH, _BAR_HEIGHT, _TICK = 14, 150, 4
@@ -76,7 +73,7 @@ class Hint:
 figure: UnitFigure | None = None
 hint: Hint | None = None
 bars: dict[int, tuple[float, float, float, float]] = {}  # by area: x, y, width and height of the heat map's color bar
-on_draw: Callable[[], None] | None = None  # called before each drawing: has the slice been moved?
+on_draw: Callable[[], None] | None = None  # called before each drawing: is all as it is wanted?
 _handles: list[Any] = []
 
 
@@ -98,14 +95,7 @@ def unregister() -> None:
 def legends() -> list[dict[str, Any]]:
     """The legends of what this view shows."""
     space, scene = bpy.context.space_data, bpy.context.scene
-    shown: list[dict[str, Any]] = [*heat.legends(scene, space), *shells.legends(scene, space)]
-    for object_ in scene_objects.objects(scene):
-        if LEGEND in object_ and object_.visible_get(viewport=space):
-            text = object_[LEGEND]
-            legend = read_legend(text) if isinstance(text, str) else None
-            if legend is not None:
-                shown.append(legend)
-    return shown
+    return [legend for kind in (heat, shells, slice_plane) for legend in kind.legends(scene, space)]
 
 
 def _draw_legends() -> None:
@@ -259,9 +249,10 @@ def _picture_batch(picture: UnitPicture) -> Any:
 
 
 def _draw_in_space() -> None:
-    """What stands in the scene's space: the heat map and the shells, and the marks of the figure over them."""
+    """What stands in the scene's space: heat map, shells and slice, and the marks of the figure over them."""
     heat.draw()
     shells.draw()
+    slice_plane.draw()
     _draw_marks()
 
 

@@ -9,12 +9,11 @@ import numpy as np
 from ...metric.errors import FMQMError
 from ...metric.geometry import Floats
 from .. import session
-from ..properties.rows import active_row
+from ..properties.rows import FMQMRow, active_row
 from ..properties.view import FMQMLook
 
 POINT = 1.1  # usual radius of a point, in mean distances between neighbors
 AGAIN = "the samples are not in memory any longer; press Measure Quality again"
-UID = "fmqm_uid"  # custom property of our objects: the row that they show
 
 
 def look_of(scene: bpy.types.Scene) -> FMQMLook:
@@ -35,6 +34,12 @@ def measured_row(scene: bpy.types.Scene) -> tuple[str, str, session.Measured]:
     if measured is None:
         raise FMQMError(f"{row.name}: {'it could not be measured' if row.error else AGAIN}")
     return row.uid, row.name, measured
+
+
+def showable(scene: bpy.types.Scene) -> FMQMRow | None:
+    """The chosen row, if it can be shown: its samples are in memory, and what it measured has not changed since."""
+    row = active_row(scene)
+    return None if row is None or row.uid in session.stale or session.get(row.uid) is None else row
 
 
 def world_matrix(measured: session.Measured, place: str) -> Floats:

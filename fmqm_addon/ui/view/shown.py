@@ -9,9 +9,8 @@ from ...blender.display import scene_objects, viewport
 from ...comparison.judge import Judge
 from .. import session
 from ..properties.rows import active_row
-from . import heat, overlay, shells, worst
-from .result import UID, look_of, measured_row
-from .slice_plane import draw_slice
+from . import heat, overlay, shells, slice_plane, worst
+from .result import look_of, measured_row
 from .units import follow_unit
 
 
@@ -27,10 +26,8 @@ def follow_row(scene: bpy.types.Scene) -> None:
         look.focused = False
     heat.refresh(scene)
     uid, _, measured = measured_row(scene)
-    plane = scene_objects.find_object(scene, scene_objects.SLICE)
-    if plane is not None and plane.get(UID) != uid:
-        draw_slice(scene)
-    shells.follow_shells(scene)
+    for kind in (slice_plane, shells):
+        kind.refresh(scene)
     worst.fill_worst(look, measured.comparison.result, uid)
     follow_unit(scene)
 
@@ -52,7 +49,6 @@ def follow_judge(scene: bpy.types.Scene) -> None:
 def follow_place(scene: bpy.types.Scene) -> None:
     """Moves what is shown to the place that the look says."""
     heat.refresh(scene)
-    shells.follow_shells(scene)
     follow_unit(scene)
 
 
@@ -67,11 +63,12 @@ def show_heat_map(scene: bpy.types.Scene) -> None:
 def clear() -> int:
     """Takes all of it away, and the views back to where they were; how many data-blocks there were."""
     overlay.figure = None
-    shells.shown.clear()
     for scene in bpy.data.scenes:
         look = look_of(scene)
         look.focused, look.show = False, heat.OFF
-    heat.build_all()
+        look.show_slice = look.show_shells = False
+    for build_all in (heat.build_all, slice_plane.refresh_all, shells.refresh_all):
+        build_all()
     viewport.unframe()
     count = scene_objects.clear()
     viewport.redraw()
@@ -82,12 +79,13 @@ def forget_removed() -> None:
     """Lets go of the arrays of rows that no scene has any more; undo brings such a row back without them. Cheap."""
     uids = {row.uid for scene in bpy.data.scenes for row in scene.fmqm.rows}
     session.keep(uids)
-    heat.keep(uids)
-    shells.keep(uids)
+    for kind in (heat, slice_plane, shells):
+        kind.keep(uids)
     if overlay.figure is not None and overlay.figure.uid not in uids:
         overlay.figure = None
 
 
 def anything() -> bool:
-    shown = any(look_of(scene).show != heat.OFF for scene in bpy.data.scenes)
-    return shown or bool(shells.shown) or overlay.figure is not None or scene_objects.anything()
+    looks = map(look_of, bpy.data.scenes)
+    drawn = any(look.show != heat.OFF or look.show_slice or look.show_shells for look in looks)
+    return drawn or overlay.figure is not None or scene_objects.anything()

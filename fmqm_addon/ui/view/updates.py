@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is shown is brought up to date: where a property changes, and where the slice is moved."""
+"""What is shown is brought up to date: where a property changes, and before a view is drawn."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from contextlib import suppress
 
 import bpy
 
-from ...blender.display import scene_objects
 from ...metric.errors import FMQMError
 from ..properties import view as properties
-from . import heat, overlay, shown, slice_plane, worst
+from . import heat, overlay, shells, shown, slice_plane, worst
+from .result import look_of
 
-_SLICE_REST = 0.12  # seconds after which a moved slice is drawn again
+_REST = 0.12  # seconds after which a slice that was moved is drawn finely again
 
 
 def _on_change(scene: bpy.types.Scene, name: str, context: bpy.types.Context) -> None:
@@ -27,9 +27,25 @@ def _on_change(scene: bpy.types.Scene, name: str, context: bpy.types.Context) ->
             update(scene)
 
 
-def _rebuild_slice(scene: bpy.types.Scene) -> None:
-    if scene_objects.find_object(scene, scene_objects.SLICE) is not None:
-        slice_plane.show_slice(scene)
+def _move_slice(scene: bpy.types.Scene) -> None:
+    """It is rough until it rests; without a window it never moves."""
+    if not bpy.app.background:
+        slice_plane.moving.add(scene.name)
+        _later(_rest_slice, _REST)
+    slice_plane.refresh(scene)
+
+
+def _change_shells(scene: bpy.types.Scene) -> None:
+    """They take a moment: while a number is dragged, those before stay."""
+    if bpy.app.background or not look_of(scene).show_shells:
+        shells.refresh(scene)
+    else:
+        _later(shells.refresh_all, _REST)
+
+
+def _rest_slice() -> None:
+    slice_plane.moving.clear()
+    slice_plane.refresh_all()
 
 
 _UPDATES: dict[str, tuple[Callable[[bpy.types.Scene], object], ...]] = {
@@ -37,28 +53,30 @@ _UPDATES: dict[str, tuple[Callable[[bpy.types.Scene], object], ...]] = {
     "judge": (shown.follow_judge,),
     "show": (heat.refresh,),
     "layer": (heat.refresh,),
-    "range": (heat.refresh, slice_plane.draw_slice),
+    "range": (heat.refresh, slice_plane.refresh),
     "place": (shown.follow_place,),
     "point_size": (heat.refresh,),
-    "slice_layer": (slice_plane.draw_slice,),
-    "slice_resolution": (_rebuild_slice,),
+    "shells": (_change_shells,),
+    "slice": (slice_plane.refresh,),
+    "slice_place": (_move_slice,),
 }
 
 
 def _watch() -> None:
     """Called at each drawing of a view; the work waits for a timer, outside of the drawing."""
     scene = bpy.context.scene
-    if slice_plane.slice_has_moved(scene) and not bpy.app.timers.is_registered(_redraw_slice):
-        bpy.app.timers.register(_redraw_slice, first_interval=_SLICE_REST)
-    if not heat.is_current(scene) and not bpy.app.timers.is_registered(heat.build_all):
-        bpy.app.timers.register(heat.build_all, first_interval=0)
+    for kind, build_all in _TIMERS.items():
+        if not kind.is_current(scene) and not bpy.app.timers.is_registered(build_all):
+            bpy.app.timers.register(build_all, first_interval=0)
 
 
-def _redraw_slice() -> None:
-    for scene in bpy.data.scenes:
-        if slice_plane.slice_has_moved(scene):
-            with suppress(FMQMError):
-                slice_plane.draw_slice(scene)
+_TIMERS = {heat: heat.build_all, shells: shells.refresh_all, slice_plane: slice_plane.refresh_all}
+
+
+def _later(act: Callable[[], None], seconds: float) -> None:
+    if bpy.app.timers.is_registered(act):
+        bpy.app.timers.unregister(act)
+    bpy.app.timers.register(act, first_interval=seconds)
 
 
 def register() -> None:
@@ -69,9 +87,10 @@ def register() -> None:
 
 def unregister() -> None:
     shown.clear()  # nothing could take it away later
+    slice_plane.moving.clear()
     overlay.on_draw = None
     overlay.unregister()
     properties.on_change = None
-    for timer in (_redraw_slice, heat.build_all):
+    for timer in (_rest_slice, *_TIMERS.values()):
         if bpy.app.timers.is_registered(timer):
             bpy.app.timers.unregister(timer)

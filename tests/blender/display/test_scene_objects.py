@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is put into the scene: points, surfaces, slices, and that nothing of it stays or piles up."""
+"""What is put into the scene: points, surfaces, and that nothing of it stays or piles up."""
 
 from __future__ import annotations
 
@@ -67,10 +67,6 @@ def test_a_second_one_replaces_the_first() -> None:
     first.name = "My Own Name"  # tags, not names, say what is ours
     cloud()
     assert len(scenes.blocks()) == len(before)
-    scene_objects.build_slice(bpy.context.scene, "FMQM Slice", np.eye(4), 8)
-    before = scenes.blocks()
-    scene_objects.build_slice(bpy.context.scene, "FMQM Slice", np.eye(4), 16)
-    assert len(scenes.blocks()) == len(before)
 
 
 def test_clear_takes_only_what_is_ours() -> None:
@@ -83,17 +79,6 @@ def test_clear_takes_only_what_is_ours() -> None:
     bpy.context.scene.collection.objects.link(made.copy())  # Shift D
     triangles = np.array([[0, 1, 2]])
     scene_objects.build_surface(bpy.context.scene, scene_objects.PAINTED, "FMQM Painted", POSITIONS, triangles, MOVED)
-    scene_objects.build_slice(bpy.context.scene, "FMQM Slice", MOVED, 8)
     assert scene_objects.clear() > 0
     assert scenes.blocks() == before
     assert not scene_objects.anything()
-
-
-def test_slice_holds_the_colors_as_they_are_encoded() -> None:
-    plane = scene_objects.build_slice(bpy.context.scene, "FMQM Slice", MOVED, 2)
-    wanted = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1], [0.2, 0.4, 0.6]])
-    scene_objects.draw_slice(plane, wanted)
-    pixels = np.empty(16, np.float32)
-    plane.data.pixels.foreach_get(pixels)
-    assert pixels.reshape(4, 4)[:, :3] == pytest.approx(wanted, abs=0.5 / 255)
-    assert plane.empty_display_type == "IMAGE" and tuple(plane.data.size) == (2, 2)
