@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The probe: values under the mouse, and the ends of the legend, which can be dragged meanwhile."""
+"""The probe: values under the mouse."""
 
 from __future__ import annotations
 
@@ -10,15 +10,13 @@ from ..view.result import look_of
 from .pick import holds
 from .polls import allowed, no_viewport
 
-_STATUS = "Move: Values under the Mouse    Drag an End of the Legend: Range    Esc, Right Click: Finish"
-_REACH = 12  # pixels around an end of the legend's bar in which it is taken
-_LEAST = 0.001  # between the ends
+_STATUS = "Move: Values under the Mouse    Esc, Right Click: Finish"
 
 
 class FMQM_OT_probe(bpy.types.Operator):  # noqa: N801
     bl_idname = "fmqm.probe"
     bl_label = "Probe"
-    bl_description = "Show the score and the features of the place under the mouse; drag the ends of the legend"
+    bl_description = "Show the score and the features of the place under the mouse"
     bl_options: set[str] = set()
 
     @classmethod
@@ -26,7 +24,7 @@ class FMQM_OT_probe(bpy.types.Operator):  # noqa: N801
         return allowed(cls, no_viewport(context))
 
     def invoke(self, context: bpy.types.Context, _: bpy.types.Event) -> set[str]:
-        self._area, self._end = context.area, ""
+        self._area = context.area
         if look_of(context.scene).show == heat.OFF:
             look_of(context.scene).show = heat.SURFACE
         context.workspace.status_text_set(_STATUS)
@@ -44,14 +42,8 @@ class FMQM_OT_probe(bpy.types.Operator):  # noqa: N801
         if region is None:
             return self._finish(context)
         at = (event.mouse_x - region.x, event.mouse_y - region.y)
-        if event.type == "LEFTMOUSE":
-            self._end = self._end_at(context, at) if event.value == "PRESS" else ""
-            return {"RUNNING_MODAL"} if self._end else {"PASS_THROUGH"}
         if event.type != "MOUSEMOVE":
             return {"PASS_THROUGH"}
-        if self._end:
-            self._drag(context, at)
-            return {"RUNNING_MODAL"}
         overlay.hint = None
         if holds(self._area, region, event):
             found = probe.probe(context.scene, region, self._area.spaces.active.region_3d, at)
@@ -59,35 +51,6 @@ class FMQM_OT_probe(bpy.types.Operator):  # noqa: N801
             overlay.hint = overlay.Hint(self._area.as_pointer(), at, lines) if lines else None
         self._area.tag_redraw()
         return {"PASS_THROUGH"}
-
-    def _end_at(self, context: bpy.types.Context, at: tuple[float, float]) -> str:
-        """Which end of the legend's bar lies at a place: "low", "high" or ""."""
-        bar = overlay.bars.get(self._area.as_pointer())
-        shown = heat.shown_in(context.scene)
-        if bar is None or shown is None or shown.values is None:
-            return ""
-        x, y, width, height = bar
-        reach = _REACH * context.preferences.system.ui_scale
-        if not x - reach <= at[0] <= x + width + 3 * reach:
-            return ""
-        return "low" if abs(at[1] - y) < reach else "high" if abs(at[1] - y - height) < reach else ""
-
-    def _drag(self, context: bpy.types.Context, at: tuple[float, float]) -> None:
-        shown, look = heat.shown_in(context.scene), look_of(context.scene)
-        bar = overlay.bars.get(self._area.as_pointer())
-        if shown is None or bar is None:
-            return
-        _, y, _, height = bar
-        place = (at[1] - y) / height
-        low, high = shown.ends
-        value = min(max(low + place * (high - low), 0.0), 1.0)
-        if self._end == "low":
-            low = min(value, high - _LEAST)
-        else:
-            high = max(value, low + _LEAST)
-        look.low, look.high = low, high
-        if look.range != "CUSTOM":
-            look.range = "CUSTOM"
 
     def cancel(self, context: bpy.types.Context) -> None:
         self._finish(context)

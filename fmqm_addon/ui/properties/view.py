@@ -75,7 +75,7 @@ class FMQMLook(bpy.types.PropertyGroup):
         description="Which values the ends of the color map stand for",
         items=[
             ("FITTED", "Fitted", "Scores from their 5th percentile over all results to 1; other values as they occur"),
-            ("CUSTOM", "Custom", "Ends of your own for scores; the probe drags them in the legend"),
+            ("CUSTOM", "Custom", "Ends of your own for scores; drag them in the legend"),
             ("FIXED", "Fixed", "0 to 1 for scores and colors; 1 or 2 % of the original's size for distances"),
         ],
         update=notify("range"),

@@ -117,6 +117,7 @@ def _build(scene: bpy.types.Scene, key: tuple[Any, ...], before: Shown | None) -
     if values is not None and layers.LAYERS[look.layer].kind == layers.SCORE:
         counts = histogram(values, *ends)
         legend["histogram"] = (counts / max(int(counts.max()), 1)).tolist()
+        legend["seen_below"] = (look.below - ends[0]) / (ends[1] - ends[0]) if look.only_below else 1.0
     return Shown(key, uid, look.show, look.layer, parts, ends, legend, values, fields)
 
 

@@ -10,6 +10,26 @@ import bpy
 from ...metric.evaluation import Result
 from ...report.visual import layers
 
+LOW, HIGH, BELOW = "low", "high", "below"  # what can be dragged: the ends, and the score below which patches are shown
+_LEAST = 0.001  # between the ends
+
+
+def moved(end: str, before: tuple[float, float, float], share: float) -> tuple[float, float, float]:
+    """The ends and the threshold after one of them has been dragged.
+
+    Args:
+        before: low, high and below when the drag began. share: how far, upwards, in heights of the bar at that time.
+    """
+    low, high, below = before
+    step = share * (high - low)
+    if end == LOW:
+        low = max(0.0, min(low + step, high - _LEAST))
+    elif end == HIGH:
+        high = min(1.0, max(high + step, low + _LEAST))
+    else:
+        below = min(1.0, max(0.0, below + step))
+    return low, high, below
+
 
 def legend_of(
     scene: bpy.types.Scene, layer: str, ends: tuple[float, float], result: Result, name: str

@@ -20,7 +20,7 @@ from ...metric.geometry import Floats
 from .. import session
 from ..properties.rows import active_row
 from . import heat, shells, slice_plane
-from .ink import Ink, box, draw_shape, free_corner
+from .ink import Color, Ink, box, draw_shape, free_corner
 
 _PAD, _LINE, _GAP = 10, 17, 8  # pixels at a UI scale of 1
 _BAR_WIDTH, _BAR_HEIGHT, _TICK = 14, 150, 4
@@ -70,9 +70,21 @@ class Hint:
     lines: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class Handle:
+    """What can be dragged at a legend's bar: the bar's left end and width, and its height there, in pixels. color: or
+    that of texts."""
+
+    x: float
+    y: float
+    width: float
+    color: Color | None
+
+
 figure: UnitFigure | None = None
 hint: Hint | None = None
 bars: dict[int, tuple[float, float, float, float]] = {}  # by area: x, y, width and height of the heat map's color bar
+handles: dict[int, list[Handle]] = {}  # by area: of this drawing
 on_draw: Callable[[], None] | None = None  # called before each drawing: is all as it is wanted?
 _handles: list[Any] = []
 
@@ -103,12 +115,15 @@ def _draw_legends() -> None:
     if on_draw is not None:
         on_draw()
     if not bpy.context.space_data.overlay.show_overlays:
+        handles.pop(bpy.context.area.as_pointer(), None)
         return
     ink = Ink()
     x, y = free_corner(ink)
     bars.pop(bpy.context.area.as_pointer(), None)
     for legend in legends():
         x += _draw_legend(ink, legend, x, y) + ink.px(_GAP)
+    for handle in handles.pop(bpy.context.area.as_pointer(), ()):
+        _draw_handle(ink, handle)
     if figure is not None and belongs_here(figure):
         _draw_figure(ink, figure, x, y)
     if hint is not None and hint.area == bpy.context.area.as_pointer():
@@ -149,7 +164,7 @@ def _draw_legend(ink: Ink, legend: dict[str, Any], x: float, y: float) -> float:
     if bar:
         place = (left + px(_COUNTS if counts else 0), top - line * 0.7 - px(_BAR_HEIGHT))
         if counts:
-            _draw_counts(ink, counts, *place)
+            _draw_counts(ink, counts, legend["seen_below"], *place)
             bars[bpy.context.area.as_pointer()] = (*place, px(_BAR_WIDTH), px(_BAR_HEIGHT))
         _draw_bar(ink, legend, *place)
     for color, text in swatches:
@@ -161,12 +176,20 @@ def _draw_legend(ink: Ink, legend: dict[str, Any], x: float, y: float) -> float:
     return float(width + 2 * pad)
 
 
-def _draw_counts(ink: Ink, counts: list[float], x: float, y: float) -> None:
-    """How many patches have each value, as bars to the left of the color bar, whose lower left corner is given."""
+def _draw_counts(ink: Ink, counts: list[float], seen_below: float, x: float, y: float) -> None:
+    """How many patches have each value, as bars to the left of the color bar, whose lower left corner is given; those
+    that are not shown are pale."""
     step = ink.px(_BAR_HEIGHT) / len(counts)
     for number, count in enumerate(counts):
-        length = count * ink.px(_COUNTS - 4)
-        box(x - ink.px(2) - length, y + number * step, length, max(step - 1, 1), ink.faint)
+        length = count * ink.px(_COUNTS - 8)
+        color = ink.faint if (number + 0.5) / len(counts) < seen_below else (*ink.faint[:3], 0.25)
+        box(x - ink.px(6) - length, y + number * step, length, max(step - 1, 1), color)
+
+
+def _draw_handle(ink: Ink, shown: Handle) -> None:
+    side, thick = ink.px(3), ink.px(4)
+    box(shown.x - side - 1, shown.y - thick / 2 - 1, shown.width + 2 * side + 2, thick + 2, (0.0, 0.0, 0.0, 0.8))
+    box(shown.x - side, shown.y - thick / 2, shown.width + 2 * side, thick, shown.color or ink.text)
 
 
 def _draw_hint(ink: Ink, shown: Hint) -> None:
