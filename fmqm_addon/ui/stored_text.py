@@ -70,6 +70,14 @@ def read_screen_size(text: str) -> dict[str, Any] | None:
 
 
 @functools.lru_cache(64)
+def read_extent(text: str) -> tuple[float, float, float] | None:
+    """As screen_size.engines.Extent."""
+    found = _read(text)
+    is_right = isinstance(found, list) and len(found) == 3 and all(isinstance(n, float) and n > 0 for n in found)
+    return (found[0], found[1], found[2]) if is_right else None
+
+
+@functools.lru_cache(64)
 def read_trust(text: str) -> Report | None:
     """As report.trust_table.trust_dict has it."""
     found = _read(text)

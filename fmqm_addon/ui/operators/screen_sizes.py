@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import astuple
 from typing import ClassVar
 
 import bpy
@@ -15,12 +16,13 @@ from ...blender.scene.target import Target, take
 from ...comparison.candidates import AssetMesh
 from ...metric.errors import FMQMError
 from ...metric.stepper import Progress, Stepper, Work, as_part
-from ...screen_size.chain import SizedLOD, sizing_chain
+from ...screen_size.chain import SizedChain, sizing_chain
 from ...screen_size.records import size_record
 from .. import session, stale
 from ..modal import SteppedOperator
 from ..properties.rows import FMQMRow, active_row, row_targets
 from ..properties.settings import pair_options, patterns_of
+from ..sizes import engine_text
 from .polls import allowed
 
 _READING = 0.1  # share of the whole that reading the scene takes, about
@@ -56,15 +58,17 @@ class FMQM_OT_screen_sizes(SteppedOperator, bpy.types.Operator):  # noqa: N801
 
     def finish(self, _: bpy.types.Context) -> set[str]:
         scene = next((scene for scene in bpy.data.scenes if scene.name_full == self._scene), None)
-        found: str | tuple[SizedLOD, ...] = self.stepper.result
-        if scene is None or isinstance(found, str):
-            self.report({"WARNING"}, "The scene is gone, and the sizes with it" if scene is None else str(found))
+        sized_chain: str | SizedChain = self.stepper.result
+        if scene is None or isinstance(sized_chain, str):
+            self.report({"WARNING"}, "The scene is gone, and the sizes with it" if scene is None else str(sized_chain))
             return {"CANCELLED"}
+        found, extent = sized_chain.lods, json.dumps(astuple(sized_chain.extent), allow_nan=False)
         sized = dict(zip(self._uids, found, strict=True))
         for row in scene.fmqm.rows:
             if row.uid in sized:
                 size = sized[row.uid].size
                 row.screen_size = "" if size is None else json.dumps(size_record(size), allow_nan=False)
+                row.screen_extent = "" if size is None else extent
         failed = [each for each in found if each.error]
         if failed:
             self.report({"WARNING"}, f"{len(failed)} of {len(found)} not rendered: {failed[0].error}")
@@ -85,7 +89,7 @@ def _rows(scene: bpy.types.Scene) -> list[FMQMRow]:
 
 def _sizing(
     reference: Target, targets: Sequence[Target], space: str, match_scale: bool, reading: Reading
-) -> Work[str | tuple[SizedLOD, ...]]:
+) -> Work[str | SizedChain]:
     """Sizes in the order of the targets; or why there are none."""
     read: list[tuple[str, AssetMesh | str]] = []
     for index, target in enumerate((reference, *targets)):
@@ -99,9 +103,25 @@ def _sizing(
         return original
     try:
         sizing = sizing_chain(original, read[1:], BVHQuery, space=space, match_scale=match_scale)
-        return (yield from as_part(sizing, _READING, 1 - _READING)).lods
+        return (yield from as_part(sizing, _READING, 1 - _READING))
     except FMQMError as error:
         return str(error)
 
 
-CLASSES = (FMQM_OT_screen_sizes,)
+class FMQM_OT_copy_sizes(bpy.types.Operator):  # noqa: N801
+    bl_idname = "fmqm.copy_sizes"
+    bl_label = "Copy for Engine"
+    bl_description = "Copy these lines to the clipboard, to paste them into the engine"
+    bl_options: ClassVar = {"INTERNAL"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return allowed(cls, "" if engine_text(context.scene) else "Press Screen Sizes first")
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        context.window_manager.clipboard = engine_text(context.scene) + "\n"
+        self.report({"INFO"}, "Copied")
+        return {"FINISHED"}
+
+
+CLASSES = (FMQM_OT_screen_sizes, FMQM_OT_copy_sizes)

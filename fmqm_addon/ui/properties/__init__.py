@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the add-on stores in the scene. Knows neither operators nor panels."""
 
-from . import decimate, items, rows, scene, settings, view
+from . import decimate, items, rows, scene, settings, sizes, view
 
 # Groups before the group that holds them.
 CLASSES: tuple[type, ...] = (
@@ -10,5 +10,6 @@ CLASSES: tuple[type, ...] = (
     *settings.CLASSES,
     *view.CLASSES,
     *decimate.CLASSES,
+    *sizes.CLASSES,
     *scene.CLASSES,
 )

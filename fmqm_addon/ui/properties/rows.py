@@ -52,6 +52,7 @@ class FMQMRow(bpy.types.PropertyGroup):
     reverse: StringProperty(name="Reverse", description="As Scores, of the other direction; empty: not measured")
     attribution: StringProperty(name="Attribution", description="Whose loss it is, as JSON; empty: not measured")
     screen_size: StringProperty(name="Screen Size", description="Where it may be shown, as JSON; empty: not measured")
+    screen_extent: StringProperty(name="Extent", description="How large the original is, as JSON, for engines' numbers")
     trust: StringProperty(name="Trust", description="How far to trust the scores: facts with their units, as JSON")
     parts: StringProperty(name="Parts", description="Scores of the original's parts, as JSON")
     fingerprint: StringProperty(name="Fingerprint", description="Tells whether what was measured has changed since")
@@ -155,6 +156,7 @@ def is_whole(row: FMQMRow) -> bool:
         (row.former, stored_text.read_readings),
         (row.attribution, stored_text.read_attribution),
         (row.screen_size, stored_text.read_screen_size),
+        (row.screen_extent, stored_text.read_extent),
         (row.trust, stored_text.read_trust),
         (row.parts, stored_text.read_parts),
         (row.settings, stored_text.read_settings),

@@ -17,6 +17,7 @@ from .decimate import FMQMChain, FMQMDecimate
 from .items import FMQMItem, can_be_picked
 from .rows import FMQMRow
 from .settings import FMQMSettings
+from .sizes import FMQMSizes
 from .view import FMQMLook, notify
 
 
@@ -64,6 +65,7 @@ class FMQMScene(bpy.types.PropertyGroup):
         ],
         update=notify("judge"),
     )
+    sizes: PointerProperty(name="Screen Sizes", description="The engine that sizes on screen are for", type=FMQMSizes)
     look: PointerProperty(name="Look", description="What of the chosen result is shown", type=FMQMLook)
     chain: PointerProperty(name="LOD Chain", description="The LODs that are made of an object", type=FMQMChain)
     decimate: PointerProperty(

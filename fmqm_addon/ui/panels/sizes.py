@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel of the sizes on screen: from which on each LOD may be shown, and an engine's numbers for that."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import bpy
+
+from ...report.records import size_text
+from ..operators.screen_sizes import FMQM_OT_copy_sizes
+from ..properties.rows import row_screen_size
+from ..sizes import engine_text, levels_of, sized_rows
+from .sidebar import CHARACTER, Sidebar, cut_in_the_middle, width, wrapped
+
+
+class FMQM_PT_sizes(Sidebar, bpy.types.Panel):  # noqa: N801
+    bl_idname = "FMQM_PT_sizes"
+    bl_parent_id = "FMQM_PT_main"
+    bl_label = "Screen Sizes"
+    bl_description = "At which size on screen each LOD may be shown, and what an engine takes for that"
+    bl_options: ClassVar = {"DEFAULT_CLOSED"}
+    bl_order = 1
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return bool(sized_rows(context.scene))
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, sizes = self.layout, context.scene.fmqm.sizes
+        table = layout.column(align=True)
+        for row in sized_rows(context.scene):
+            split = table.split(factor=0.5)
+            split.label(text=cut_in_the_middle(row.name, int(width(context) / 2 / CHARACTER) - 4), translate=False)
+            split.label(text=f"{size_text(row_screen_size(row) or {}, sizes.transition)} px")
+        for level in levels_of(context.scene):
+            if level.why:
+                wrapped(layout, context, f"{level.name} has no place in the chain: {level.why}", icon="INFO")
+        note = layout.column()
+        note.active = False
+        wrapped(note, context, "Pixels that the diagonal of the original's box spans")
+        layout.row().prop(sizes, "transition", expand=True)
+        layout.use_property_split, layout.use_property_decorate = True, False
+        layout.prop(sizes, "engine")
+        column = layout.column(align=True)
+        column.prop(sizes, "height")
+        if sizes.engine in ("unreal", "gltf"):
+            column.prop(sizes, "width")
+        if sizes.engine in ("godot", "threejs"):
+            column.prop(sizes, "fov")
+        if sizes.engine == "unity":
+            column.prop(sizes, "lod_bias")
+        if sizes.engine == "gltf":
+            column.prop(sizes, "height_ratio")
+        box = layout.box().column(align=True)
+        box.scale_y = 0.8
+        for line in engine_text(context.scene).splitlines():
+            box.label(text=line, translate=False)
+        layout.operator(FMQM_OT_copy_sizes.bl_idname, icon="COPYDOWN")
+
+
+CLASSES = (FMQM_PT_sizes,)
