@@ -1,7 +1,6 @@
 "use strict";
 // Where one looks from: turned by mouse, touch and keys, and flown to places. Z is up, as in Blender.
 fmqmViewer.camera = (() => {
-  const AZIMUTH = 32, ELEVATION = 16; // degrees, as in the pictures: from the front (-Y) to the right, and up
   const FIELD_OF_VIEW = 24; // degrees, from top to bottom
   const MARGIN = 1.08;
   const TURN = Math.PI / 24; // for a press of an arrow
@@ -21,8 +20,9 @@ fmqmViewer.camera = (() => {
     return new THREE.Vector3(level * Math.sin(azimuth), -level * Math.cos(azimuth), radius * Math.sin(elevation));
   }
 
-  // element: where it is turned. box, points: of what is to be seen. changed: called whenever the view is another.
-  function cameraOf(element, box, points, changed) {
+  // element: where it is turned. box, points: of what is to be seen. side: from which, in degrees from the front (-Y) to
+  // the right, and up. changed: called whenever the view is another.
+  function cameraOf(element, { box, points }, side, changed) {
     const camera = new THREE.PerspectiveCamera(FIELD_OF_VIEW);
     camera.up.set(0, 0, 1);
     const controls = new THREE.OrbitControls(camera, element);
@@ -76,7 +76,7 @@ fmqmViewer.camera = (() => {
     }
 
     function home() {
-      const place = { azimuth: (AZIMUTH * Math.PI) / 180, elevation: (ELEVATION * Math.PI) / 180, radius: 1 };
+      const place = { azimuth: (side[0] * Math.PI) / 180, elevation: (side[1] * Math.PI) / 180, radius: 1 };
       const back = cartesian(place);
       const right = new THREE.Vector3(0, 0, 1).cross(back).normalize();
       const up = back.clone().cross(right);

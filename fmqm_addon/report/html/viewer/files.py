@@ -15,6 +15,7 @@ from ....metric.errors import FileError, OutputError
 from ....metric.evaluation import Result
 from ....metric.surface import Surface
 from ...atomic_files import write_text
+from ...render import AZIMUTH, ELEVATION
 from .heat import heat_data
 from .mesh import mesh_data
 from .packing import script_text
@@ -22,6 +23,7 @@ from .packing import script_text
 VIEWER = "viewer"  # the folder beside the page
 PROGRAMS = ("three.js", "viewer.js")
 _PARTS = ("shaders.js", "scene.js", "camera.js", "viewer.js")  # of viewer.js
+FRONT_RIGHT = (AZIMUTH, ELEVATION)
 _DATA = re.compile(rf"{VIEWER}/[A-Za-z0-9-]+\.js")
 
 
@@ -51,13 +53,20 @@ def write_reference_data(folder: str, stem: str, reference: Surface) -> Referenc
 
 
 def write_pair_data(
-    folder: str, stem: str, shared: ReferenceFile, distorted: Surface, result: Result, judge: Judge
+    folder: str,
+    stem: str,
+    shared: ReferenceFile,
+    distorted: Surface,
+    result: Result,
+    judge: Judge,
+    side: tuple[float, float] = FRONT_RIGHT,
 ) -> dict[str, str]:
     """Writes what the viewer shows of a level: its mesh, and the heat of its comparison.
 
     Args:
         folder: of the report. stem: by pictures.picture_stem, the pair's own.
         shared: of write_reference_data, of the result's reference.
+        side: azimuth and elevation in degrees from which it is seen at first, as render.Camera.framing has them.
 
     Returns:
         What a record keeps as "viewer": paths relative to the folder.
@@ -68,6 +77,7 @@ def write_pair_data(
     data = {
         "reference": shared.path,
         "judge": judge.column,
+        "side": side,
         "mesh": mesh_data(distorted, shared.images),
         "heat": heat_data(result, judge),
     }

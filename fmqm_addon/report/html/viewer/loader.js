@@ -52,6 +52,8 @@ const fmqmViewer = (() => {
     const button = event.target.closest(".viewer-open");
     if (button) open(button.closest(".viewer"));
   });
+  // The page closes what holds it.
+  document.addEventListener("fmqm-close", (event) => event.target.querySelector(".viewer-shown .viewer-close")?.click(), true);
 
   return {
     ramp: "RAMP",

@@ -61,7 +61,7 @@ fmqmViewer.show = (() => {
     stage.append(canvas, panes, pins, handle);
     const legend = element("div", { className: "viewer-legend" });
     const sides = element("div", { className: "viewer-choices viewer-sides" });
-    const view = fmqmViewer.camera.cameraOf(stage, pair.box, pair.points, later);
+    const view = fmqmViewer.camera.cameraOf(stage, pair, level.side, later);
 
     // What is drawn: places on the stage, each with what it shows.
     function shown() {
@@ -200,6 +200,11 @@ fmqmViewer.show = (() => {
       made.addEventListener("click", clicked);
       return made;
     };
+    const closing = button("Close", () => {
+      close();
+      place.querySelector(".viewer-open").focus();
+    });
+    closing.className = "viewer-close";
     const named = (names) => names.map((name) => [name, name]);
     const numbered = (names) => names.map((name, k) => [k, name]);
     const choices = element(
@@ -233,10 +238,7 @@ fmqmViewer.show = (() => {
       }),
       button("Reset View", () => view.reset()),
       ...(document.fullscreenEnabled ? [button("Full Screen", () => full())] : []),
-      button("Close", () => {
-        close();
-        place.querySelector(".viewer-open").focus();
-      }),
+      closing,
     );
     sides.append(
       ...["Left", "Right"].map((label, side) =>
