@@ -26,7 +26,6 @@ fmqmViewer.camera = (() => {
     const camera = new THREE.PerspectiveCamera(FIELD_OF_VIEW);
     camera.up.set(0, 0, 1);
     const controls = new THREE.OrbitControls(camera, element);
-    controls.zoomToCursor = true;
     controls.minDistance = 0.005;
     const middle = box.min.clone().add(box.max).multiplyScalar(0.5);
     const reach = box.max.distanceTo(box.min);
@@ -139,6 +138,7 @@ fmqmViewer.camera = (() => {
       // For a pane of so many pixels, when panes have changed.
       fit(width, height) {
         aspect = width / height;
+        controls.zoomToCursor = width === element.clientWidth && height === element.clientHeight; // it knows of no panes
         if (whole) look(...home());
       },
       // For a pane of so many pixels, before it is drawn.

@@ -20,7 +20,7 @@ WORST = 5  # places that are marked
 FIELDS = ("NCF_DIFFERENCE", "SDF_DIFFERENCE")  # layers that are shown by cells
 # Upper ends of their colors at least: what differs less is rounding. A color, and a share of the reference's diagonal.
 LEAST = {"NCF_DIFFERENCE": 0.01, "SDF_DIFFERENCE": 1e-4}
-_SPACINGS = 2.0  # of samples; a cell is so wide
+_SPACINGS = 2.5  # of samples; a cell is so wide
 _MOST_CELLS = 96  # along the longest side
 _FULL = 255
 _DIGITS = 7  # after the point, in diagonals of the reference

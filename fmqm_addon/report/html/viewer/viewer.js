@@ -30,7 +30,7 @@ fmqmViewer.show = (() => {
   }
 
   function number(value) {
-    return value === 0 ? "0" : Math.abs(value) >= 0.01 ? value.toPrecision(3).replace(/\.?0+$/, "") : value.toExponential(1);
+    return value === 0 ? "0" : Math.abs(value) >= 1e-4 ? value.toPrecision(3).replace(/\.?0+$/, "") : value.toExponential(1);
   }
 
   async function show(place, canvas, context, reference, level) {
