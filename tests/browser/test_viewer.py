@@ -189,6 +189,9 @@ def test_every_heat_map_paints_otherwise(page: Page, report: Path) -> None:
         if all((np.abs(image - other) > 4).any() for other in seen):
             seen.append(image)
     assert len(seen) >= 8  # some features of plain colors are 1 everywhere
+    high = level_of(report)["heat"]["layers"][-1]["high"]
+    legend = page.run("document.querySelector('.viewer-legend').textContent")
+    assert legend == f"Distance Difference0{high:.3g} scene units"
     on_original = drawn(seen[-1])
     choose(page, "Show On", 1)
     assert (drawn(pane(page, 3)) != on_original)[40:].sum() > 20  # the LOD's outline

@@ -30,7 +30,8 @@ fmqmViewer.show = (() => {
   }
 
   function number(value) {
-    return value === 0 ? "0" : Math.abs(value) >= 1e-4 ? value.toPrecision(3).replace(/\.?0+$/, "") : value.toExponential(1);
+    if (value !== 0 && Math.abs(value) < 1e-4) return value.toExponential(1);
+    return value.toLocaleString("en", { maximumSignificantDigits: 3 });
   }
 
   async function show(place, canvas, context, reference, level) {
