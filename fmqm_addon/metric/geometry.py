@@ -14,15 +14,44 @@ _MORTON_BITS = 10
 
 
 def cross(a: Floats, b: Floats) -> Floats:
-    """(N, 3) cross products; np.cross takes several times as long."""
+    """(N, 3) cross products, each axis in one piece of memory; np.cross takes several times as long."""
     ax, ay, az = a.T
     bx, by, bz = b.T
-    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
+    product = np.empty((3, len(ax)))
+    np.subtract(ay * bz, az * by, out=product[0])
+    np.subtract(az * bx, ax * bz, out=product[1])
+    np.subtract(ax * by, ay * bx, out=product[2])
+    return product.T
 
 
 def dot(a: Floats, b: Floats) -> Floats:
-    """(N,) inner products of the rows."""
-    return np.einsum("ij,ij->i", a, b)
+    """(N,) inner products of the rows; np.einsum adds them up in this order too, and takes twice as long."""
+    ax, ay, az = a.T
+    bx, by, bz = b.T
+    product: Floats = ax * bx
+    product += az * bz
+    product += ay * by
+    return product
+
+
+def lengths(rows: Floats) -> Floats:
+    """(N,) Euclidean lengths of the rows, to the last bit those of np.linalg.norm, which takes several times as long."""
+    x, y, z = rows.T
+    squared: Floats = x * x
+    squared += y * y
+    squared += z * z
+    return np.sqrt(squared, out=squared)
+
+
+def weighted(weights: Floats, a: Floats, b: Floats, c: Floats) -> Floats:
+    """(N, K) sums of the rows of (N, K) a, b and c, with (N, 3) weights; each column in one piece of memory."""
+    of_a, of_b, of_c = weights.T
+    total = np.empty((a.shape[1], len(a)))
+    for row, ka, kb, kc in zip(total, a.T, b.T, c.T, strict=True):
+        np.multiply(of_a, ka, out=row)
+        row += of_b * kb
+        row += of_c * kc
+    return total.T
 
 
 def ranges(first: Ints, last: Ints) -> Ints:
@@ -58,33 +87,35 @@ def closest_on_triangles(points: Floats, a: Floats, b: Floats, c: Floats) -> tup
     Returns:
         (N, 3) closest points and their (N, 3) barycentric coordinates, none negative, summing to 1.
     """
-    ab, ac, ap = b - a, c - a, points - a
+    # Each axis in one piece of memory, which all that follows is faster for.
+    ab, ac, ap = (np.subtract(end, start, order="F") for end, start in ((b, a), (c, a), (points, a)))
     normal = cross(ab, ac)
     # Cross products keep these two exact for slivers, where inner products would cancel.
     squared = dot(normal, normal)
-    beta = dot(cross(ap, ac), normal) / squared
-    gamma = dot(cross(ab, ap), normal) / squared
-    weights = np.stack([1 - beta - gamma, beta, gamma], axis=1)
+    weights = np.empty((len(points), 3), order="F")
+    alpha, beta, gamma = weights.T
+    np.divide(dot(cross(ap, ac), normal), squared, out=beta)
+    np.divide(dot(cross(ab, ap), normal), squared, out=gamma)
+    np.subtract(1 - beta, gamma, out=alpha)
     needle = squared < NEEDLE * NEEDLE * dot(ab, ab) * dot(ac, ac)
-    outside = np.flatnonzero((weights < 0).any(axis=1) | needle)
+    outside = np.flatnonzero((alpha < 0) | (beta < 0) | (gamma < 0) | needle)
     if outside.size:
-        weights[outside] = _closest_on_edges(points[outside], a[outside], b[outside], c[outside])
-    return weights[:, :1] * a + weights[:, 1:2] * b + weights[:, 2:] * c, weights
+        weights[outside] = _closest_on_edges(*(rows.take(outside, axis=0) for rows in (points, a, b, c)))
+    return weighted(weights, a, b, c), weights
 
 
 def _closest_on_edges(points: Floats, a: Floats, b: Floats, c: Floats) -> Floats:
     corners = (a, b, c)
     best = np.full(len(points), np.inf)
-    weights = np.zeros((len(points), 3))
+    weights = np.zeros((3, len(points)))
     for k in range(3):
         start, end = corners[k], corners[(k + 1) % 3]
-        edge = end - start
-        t = np.clip(dot(points - start, edge) / dot(edge, edge), 0, 1)
-        gap = points - start - t[:, None] * edge
+        edge, away = np.subtract(end, start, order="F"), np.subtract(points, start, order="F")
+        t = np.clip(dot(away, edge) / dot(edge, edge), 0, 1)
+        gap = away - (t * edge.T).T
         distance = dot(gap, gap)
         nearer = distance < best
-        best = np.where(nearer, distance, best)
-        w = np.zeros_like(weights)
-        w[:, k], w[:, (k + 1) % 3] = 1 - t, t
-        weights[nearer] = w[nearer]
-    return weights
+        np.copyto(best, distance, where=nearer)
+        for corner, weight in ((k, 1 - t), ((k + 1) % 3, t), ((k + 2) % 3, 0.0)):
+            np.copyto(weights[corner], weight, where=nearer)
+    return weights.T

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import MeshError
-from .geometry import Floats, Ints, cross, dot
+from .geometry import Floats, Ints, cross, dot, lengths, weighted
 from .stepper import Progress, Work, finish
 from .texture import Material
 
@@ -196,7 +196,8 @@ class Surface:
 
     def _interpolated(self, triangle: Ints, barycentric: Floats) -> Floats:
         """(N, K) the corners' values at such places."""
-        return np.einsum("nk,nkc->nc", barycentric, self.corners.take(triangle, axis=0))
+        corners = self.corners.take(triangle, axis=0)
+        return weighted(barycentric, corners[:, 0], corners[:, 1], corners[:, 2])
 
     def _by_material(self, triangle: Ints) -> Iterator[tuple[Material, Ints]]:
         """Each material that some of the triangles have, with the rows that have it."""
@@ -332,18 +333,18 @@ def is_closed(triangles: Ints) -> bool:
 
 
 def triangle_areas(vertices: Floats, triangles: Ints) -> Floats:
-    return np.linalg.norm(_area_vectors(vertices, triangles), axis=1) / 2
+    return lengths(_area_vectors(vertices, triangles)) / 2
 
 
 def triangle_normals(vertices: Floats, triangles: Ints) -> Floats:
     """(T, 3) unit normals; the triangles must not be degenerate."""
     normals = _area_vectors(vertices, triangles)
-    return normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.asarray((normals.T / lengths(normals)).T)
 
 
 def _area_vectors(vertices: Floats, triangles: Ints) -> Floats:
-    a, b, c = (vertices[triangles[:, k]] for k in range(3))
-    return cross(b - a, c - a)
+    a, b, c = (vertices.take(triangles[:, k], axis=0) for k in range(3))
+    return cross(np.subtract(b, a, order="F"), np.subtract(c, a, order="F"))
 
 
 def _is_flat(positions: Floats, triangles: Ints, frame: Frame) -> NDArray[np.bool_]:

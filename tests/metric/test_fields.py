@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fmqm_addon.metric import fields, queries
+from fmqm_addon.metric import queries, settling
 from fmqm_addon.metric.fields import Fields, evaluate_fields
 from fmqm_addon.metric.geometry import Floats, Ints, morton_order
 from fmqm_addon.metric.queries import _coarse_to_fine, _guide, count_crossings, count_crossings_of_all
@@ -259,6 +259,6 @@ def test_the_hub_of_a_fan_is_settled_in_parts(monkeypatch: pytest.MonkeyPatch) -
     shape = surface((np.concatenate([[[0, 0, 1]], rim]), np.stack([0 * k, k, k % 40 + 1], axis=1)), (texture(),))
     points = np.random.default_rng(0).normal(0, 0.5, (200, 3))
     whole = fields_at(shape, points)
-    monkeypatch.setattr(fields, "_CANDIDATES", 1)
+    monkeypatch.setattr(settling, "_CANDIDATES", 1)
     parts = fields_at(shape, points)
     assert np.array_equal(whole.triangle, parts.triangle) and np.array_equal(whole.nearest, parts.nearest)
