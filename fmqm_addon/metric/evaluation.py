@@ -169,13 +169,12 @@ class Evaluation:
             here = slice(start[0], start[-1])
             start = start - start[0]
             diagonal = np.repeat(diagonals[group], np.diff(start))  # lengths are in patch diagonals from here on
-            positions, units = samples.positions[here] / diagonal[:, None], np.flatnonzero(samples.unit[here])
+            positions, units = _shrunk(samples.positions[here], diagonal), np.flatnonzero(samples.unit[here])
             ref, other = _in_diagonals(prepared.ref, here, diagonal), _in_diagonals(dist, here, diagonal)
             near = pairs_of_patches(positions, start, units, RADIUS, itself=True)
             perceived[group] = perceived_of_patches(positions, start, ref, other, units, near)
-            if settings.radius == RADIUS:
-                pairs = near.pick(near.distance > 0)
-            else:
+            pairs = near
+            if settings.radius != RADIUS:
                 pairs = pairs_of_patches(positions, start, units, settings.radius)
             ref, other = replace(ref, channels=channels_r[here]), replace(other, channels=channels_d[here])
             features[group] = features_of_patches(positions, start, ref, other, units, pairs, weights, settings)
@@ -232,4 +231,9 @@ def fmqm(reference: MeshArrays, distorted: MeshArrays, settings: Settings, build
 
 def _in_diagonals(fields: Fields, here: slice, diagonal: Floats) -> FieldValues:
     ncf = fields.ncf[here].astype(np.float64)
-    return FieldValues(fields.nearest[here] / diagonal[:, None], fields.sdf[here] / diagonal, ncf)
+    return FieldValues(_shrunk(fields.nearest[here], diagonal), fields.sdf[here] / diagonal, ncf)
+
+
+def _shrunk(positions: Floats, by: Floats) -> Floats:
+    """(n, 3) positions by (n,) lengths, each axis in one piece of memory, which what is computed of them is faster for."""
+    return np.divide(positions.T, by, order="C").T

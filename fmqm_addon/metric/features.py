@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .geometry import Floats, Ints, dot
+from .geometry import Floats, Ints, dot, first_of_each
 from .settings import Settings
 
 EPSILON_SDF = 1e-12  # V-E1: decides 0/0 as 1
@@ -50,7 +50,7 @@ def features_of_patches(
         positions: (n, 3) samples, patch after patch, each in its own patch's diagonals.
         start: (G + 1,) patch k is start[k] : start[k + 1].
         units: ascending indices of the drawn color units. weights: (C,) of the channels.
-        pairs: pairs_of_patches within settings.radius.
+        pairs: pairs_of_patches within settings.radius; those of p with what lies at its place, if any, count for nothing.
     """
     to_ref, to_dist = ref.nearest - positions, dist.nearest - positions
     along = unit_cosine(pairs, units, to_ref)
@@ -64,16 +64,20 @@ def features_of_patches(
     along = unit_cosine(pairs, units, to_dist)
     gradient_d = color_gradient(pairs.pick(along < settings.tangent_threshold), units, dist.channels)
 
-    features = np.empty((len(start) - 1, 4))
-    for k, drawn in enumerate(_slices(np.searchsorted(units, start))):
-        here = slice(start[k], start[k + 1])
-        features[k] = (
-            geometry_similarity(ref.sdf[here], dist.sdf[here]),
-            geometry_gradient_similarity(to_ref[here], to_dist[here]),
-            np.sqrt(_pool(normal[:, drawn].mean(axis=1), weights) * _pool(tangent[:, drawn].mean(axis=1), weights)),
-            gradient_similarity(gradient_r.of(drawn), gradient_d.of(drawn), weights),
-        )
-    return features
+    drawn = np.searchsorted(units, start)
+    columns = (
+        geometry_similarity(ref.sdf, dist.sdf, start),
+        geometry_gradient_similarity(to_ref, to_dist, start),
+        np.sqrt(_pool(means(normal, drawn), weights) * _pool(means(tangent, drawn), weights)),
+        gradient_similarity(gradient_r, gradient_d, drawn, weights),
+    )
+    return np.stack(columns, axis=1)
+
+
+def means(values: Floats, start: Ints) -> Floats:
+    """(..., G) means of (..., n) values over patches, of which the k-th is start[k] : start[k + 1]."""
+    sums = [np.add.reduce(values[..., here], axis=-1) for here in _slices(start)]
+    return np.asarray(np.stack(sums, axis=-1) / np.diff(start))
 
 
 def similarity(mean_r: Any, mean_d: Any, var_r: Any, var_d: Any, cov: Any, epsilon: float) -> Any:
@@ -85,20 +89,26 @@ def similarity(mean_r: Any, mean_d: Any, var_r: Any, var_d: Any, cov: Any, epsil
     return np.cbrt(np.minimum(1.0, mean * std * covariance))
 
 
-def geometry_similarity(sdf_r: Floats, sdf_d: Floats) -> float:
-    """Equations (15) to (18) over the samples of a patch, from population moments."""
-    mean_r, mean_d = sdf_r.mean(), sdf_d.mean()
-    r, d = sdf_r - mean_r, sdf_d - mean_d
-    return float(similarity(mean_r, mean_d, np.mean(r * r), np.mean(d * d), np.mean(r * d), EPSILON_SDF))
+def geometry_similarity(sdf_r: Floats, sdf_d: Floats, start: Ints) -> Floats:
+    """(G,) equations (15) to (18) over the samples of each patch, from population moments."""
+    (mean_r, mean_d), (var_r, var_d, cov) = moments(sdf_r, sdf_d, start)
+    return np.asarray(similarity(mean_r, mean_d, var_r, var_d, cov, EPSILON_SDF))
 
 
-def geometry_gradient_similarity(to_ref: Floats, to_dist: Floats) -> float:
-    """Equations (20) and (21): root mean squared cosine of the SDF gradients; their signs square away.
+def moments(sdf_r: Floats, sdf_d: Floats, start: Ints) -> tuple[Floats, Floats]:
+    """(2, G) means of two values over the samples of each patch, and (3, G) their variances and covariance."""
+    mean = means(np.stack([sdf_r, sdf_d]), start)
+    r, d = np.stack([sdf_r, sdf_d]) - mean.repeat(np.diff(start), axis=1)
+    return mean, means(np.stack([r * r, d * d, r * d]), start)
+
+
+def geometry_gradient_similarity(to_ref: Floats, to_dist: Floats, start: Ints) -> Floats:
+    """(G,) equations (20) and (21): root mean squared cosine of the SDF gradients; their signs square away.
 
     Args:
         to_ref, to_dist: (n, 3) p_n - p. A sample on either surface counts 1.
     """
-    return float(np.sqrt(np.mean(_squared_cosine(to_ref, to_dist, 1.0))))
+    return np.sqrt(means(_squared_cosine(to_ref, to_dist, 1.0), start))
 
 
 @dataclass(frozen=True)
@@ -106,7 +116,8 @@ class Pairs:
     """Pairs of a color unit p and another sample p' of its patch, unit after unit, p' ascending.
 
     Attributes:
-        row: (m,) which unit. other: (m,) p'. offset: (m, 3) p' - p. distance: (m,) |pp'|.
+        row: (m,) which unit. other: (m,) p'. distance: (m,) |pp'|.
+        offset: (m, 3) p' - p, each axis in one piece of memory.
     """
 
     row: Ints
@@ -119,35 +130,46 @@ class Pairs:
         return Pairs(
             self.row.take(chosen),
             self.other.take(chosen),
-            self.offset.take(chosen, axis=0),
+            self.offset.T.take(chosen, axis=1).T,
             self.distance.take(chosen),
         )
 
 
 def find_pairs(positions: Floats, units: Ints, radius: float, itself: bool = False) -> Pairs:
-    """All pairs with 0 < |pp'| < radius; a rough search in float32, with room for its rounding, comes first.
+    """All pairs with 0 < |pp'| < radius, of one patch. With itself, p and what lies at its very place count too."""
+    return pairs_of_patches(positions, np.array([0, len(positions)]), units, radius, itself)
 
-    With itself, p and what lies at its very place count too. The rough squared distances are inner products:
-    p.p - 2 p.p' + p'.p'.
+
+def pairs_of_patches(positions: Floats, start: Ints, units: Ints, radius: float, itself: bool = False) -> Pairs:
+    """The pairs within each patch, as find_pairs has them, indexed among all samples and all units."""
+    counts, others = [], []
+    for here, drawn in zip(_slices(start), _slices(np.searchsorted(units, start)), strict=True):
+        count, other = _roughly_near(positions[here], units[drawn] - here.start, radius)
+        counts.append(count)
+        others.append(other + here.start)
+    count, other = np.concatenate(counts), np.concatenate(others)
+    offset = np.empty((3, len(other)))
+    for along, axis in zip(offset, positions.T.copy(), strict=True):
+        np.subtract(axis.take(other), axis.take(units).repeat(count), out=along)
+    distance = np.sqrt(dot(offset.T, offset.T))
+    inside = distance < radius
+    pairs = Pairs(np.arange(len(units)).repeat(count), other, offset.T, distance)
+    return pairs.pick(inside if itself else inside & (distance > 0))
+
+
+def _roughly_near(positions: Floats, units: Ints, radius: float) -> tuple[Ints, Ints]:
+    """(units,) how many samples of a patch lie within the radius of each unit, and these, unit after unit.
+
+    In float32, with room for its rounding. Squared distances are inner products: p.p - 2 p.p' + p'.p'.
     """
     x, y, z = (positions - positions.mean(axis=0)).astype(np.float32).T
     squares, ones = x * x + y * y + z * z, np.ones(len(positions), np.float32)
     of_units = np.stack([-2 * x, -2 * y, -2 * z, squares, ones])[:, units].copy()  # einsum is slow on strides
     squared = np.einsum("ku,kn->un", of_units, np.stack([x, y, z, ones, squares]))
-    row, other = np.divmod(np.flatnonzero(squared < radius * radius + ROUGH * max(1.0, squares.max())), len(positions))
-    offset = positions.take(other, axis=0) - positions.take(units.take(row), axis=0)
-    distance = np.sqrt(dot(offset, offset))
-    inside = distance < radius
-    return Pairs(row, other, offset, distance).pick(inside if itself else inside & (distance > 0))
-
-
-def pairs_of_patches(positions: Floats, start: Ints, units: Ints, radius: float, itself: bool = False) -> Pairs:
-    """The pairs within each patch, as find_pairs has them, indexed among all samples and all units."""
-    parts = []
-    for here, drawn in zip(_slices(start), _slices(np.searchsorted(units, start)), strict=True):
-        part = find_pairs(positions[here], units[drawn] - here.start, radius, itself)
-        parts.append((part.row + drawn.start, part.other + here.start, part.offset, part.distance))
-    return Pairs(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+    near = np.flatnonzero(squared < radius * radius + ROUGH * max(1.0, squares.max()))
+    first = np.arange(len(units) + 1) * len(positions)
+    count = np.diff(np.searchsorted(near, first))
+    return count, near - first[:-1].repeat(count)
 
 
 def _slices(start: Ints) -> list[slice]:
@@ -156,15 +178,19 @@ def _slices(start: Ints) -> list[slice]:
 
 
 def unit_cosine(pairs: Pairs, units: Ints, towards: Floats) -> Floats:
-    """(m,) |cos(pp_n, pp')| of the pairs, equations (10) and (11); 0 where p = p_n.
+    """(m,) |cos(pp_n, pp')| of the pairs, equations (10) and (11); 0 where p = p_n, not a number where p = p'.
 
     Args:
         towards: (n, 3) p_n - p of all samples.
     """
-    axis = towards[units]
+    axis = towards.take(units, axis=0)
     length = np.sqrt(dot(axis, axis))
-    axis = axis / np.where(length > 0, length, 1.0)[:, None]
-    return np.abs(dot(axis.take(pairs.row, axis=0), pairs.offset)) / pairs.distance
+    count = np.bincount(pairs.row, minlength=len(units))
+    of_pairs = (axis.T / np.where(length > 0, length, 1.0)).repeat(count, axis=1)
+    cosine = np.abs(dot(of_pairs.T, pairs.offset))
+    with np.errstate(invalid="ignore"):
+        cosine /= pairs.distance
+    return cosine
 
 
 def similarity_of_units(pairs: Pairs, units: Ints, ref: FieldValues, dist: FieldValues) -> NDArray[np.float64]:
@@ -195,9 +221,6 @@ class Gradient:
     magnitude: Floats
     step: Floats
 
-    def of(self, units: slice) -> Gradient:
-        return Gradient(self.magnitude[:, units], self.step[:, units])
-
 
 def color_gradient(pairs: Pairs, units: Ints, channels: Floats) -> Gradient:
     """Equations (28) and (29): the largest color difference by distance among each unit's pairs.
@@ -209,30 +232,33 @@ def color_gradient(pairs: Pairs, units: Ints, channels: Floats) -> Gradient:
     step = np.zeros((n_channels, len(units), 3))
     if not len(pairs.row):
         return Gradient(magnitude, step)
-    difference = np.abs(channels.take(pairs.other, axis=0) - channels.take(units.take(pairs.row), axis=0)).T
-    slope = np.where(difference > SAME_COLOR, difference, 0) / pairs.distance
-    present, first = np.unique(pairs.row, return_index=True)
-    steepest = np.maximum.reduceat(slope, first, axis=1)
-    magnitude[:, present] = steepest
-    length = np.diff(first, append=len(pairs.row))
-    for channel in range(n_channels):
-        is_max = slope[channel] == np.repeat(steepest[channel], length)
-        _, winner = np.unique(pairs.row[is_max], return_index=True)
-        step[channel, present] = pairs.offset[is_max][winner]
+    first = first_of_each(pairs.row)
+    present, count = pairs.row.take(first), np.diff(first, append=len(pairs.row))
+    for channel, values in enumerate(channels.T.copy()):
+        difference = np.abs(values.take(pairs.other) - values.take(units.take(present)).repeat(count))
+        slope = np.where(difference > SAME_COLOR, difference, 0) / pairs.distance
+        steepest = np.maximum.reduceat(slope, first)
+        steep = np.flatnonzero(slope == steepest.repeat(count))
+        winner = steep.take(first_of_each(pairs.row.take(steep)))
+        magnitude[channel, present], step[channel, present] = steepest, pairs.offset.take(winner, axis=0)
     step[magnitude == 0] = 0
     return Gradient(magnitude, step)
 
 
-def gradient_similarity(ref: Gradient, dist: Gradient, weights: Floats) -> float:
-    """Equations (30) to (32): direction and magnitude of the color gradients, the means over the units."""
+def gradient_similarity(ref: Gradient, dist: Gradient, drawn: Ints, weights: Floats) -> Floats:
+    """(G,) equations (30) to (32): direction and magnitude of the color gradients, the means over the units.
+
+    Args:
+        drawn: (G + 1,) units of patch k are drawn[k] : drawn[k + 1].
+    """
     flat_r, flat_d = ref.magnitude == 0, dist.magnitude == 0
     direction = np.stack([_squared_cosine(r, d, 0.0) for r, d in zip(ref.step, dist.step, strict=True)])
     direction[flat_r & flat_d] = 1.0
     square_r, square_d = ref.magnitude**2, dist.magnitude**2
     unlike = np.abs(square_r - square_d) / (square_r + square_d + EPSILON_GRADIENT)
-    angular = np.sqrt(direction.mean(axis=1))
-    magnitude = 1 - np.sqrt(unlike.mean(axis=1))
-    return float(np.sqrt(_pool(angular, weights) * _pool(magnitude, weights)))
+    angular = np.sqrt(means(direction, drawn))
+    magnitude = 1 - np.sqrt(means(unlike, drawn))
+    return np.sqrt(_pool(angular, weights) * _pool(magnitude, weights))
 
 
 def pool_features(features: Floats, pooling: str) -> NDArray[np.float64]:
@@ -242,13 +268,13 @@ def pool_features(features: Floats, pooling: str) -> NDArray[np.float64]:
 
 def _squared_cosine(a: Floats, b: Floats, if_zero: float) -> Floats:
     """(n,) squared cosines of the rows; if_zero where either is the zero vector."""
-    lengths = dot(a, a) * dot(b, b)
+    squared_lengths = dot(a, a) * dot(b, b)
     product = dot(a, b)
-    defined = lengths > 0
     cosine = np.full(len(a), if_zero)
-    cosine[defined] = np.minimum(1.0, product[defined] * product[defined] / lengths[defined])
-    return cosine
+    np.divide(product * product, squared_lengths, out=cosine, where=squared_lengths > 0)
+    return np.minimum(1.0, cosine, out=cosine)
 
 
-def _pool(values: Floats, weights: Floats) -> np.float64:
-    return (values * weights).sum() / weights.sum()
+def _pool(values: Floats, weights: Floats) -> Floats:
+    """(G,) means of (C, G) values over the channels."""
+    return np.asarray((values * weights[:, None]).sum(axis=0) / weights.sum())

@@ -54,6 +54,11 @@ def weighted(weights: Floats, a: Floats, b: Floats, c: Floats) -> Floats:
     return total.T
 
 
+def first_of_each(ascending: Ints) -> Ints:
+    """Where each of the values, none negative, stands for the first time."""
+    return np.flatnonzero(np.diff(ascending, prepend=-1))
+
+
 def ranges(first: Ints, last: Ints) -> Ints:
     """The whole numbers first[0] .. last[0] - 1, first[1] .. last[1] - 1, and so on, in one array."""
     counts = last - first

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .features import FieldValues, Pairs
+from .features import FieldValues, Pairs, means, moments
 from .geometry import Floats, Ints, cross, dot
 
 
@@ -52,14 +52,12 @@ def perceived_of_patches(
     facing = facing_similarity(to_ref, to_dist)
     color, detail = color_similarities(near, units, ref.channels, dist.channels)
 
-    table = np.empty((len(start) - 1, 5))
     drawn = np.searchsorted(units, start)
-    for k, row in enumerate(table):
-        here, its_units = slice(start[k], start[k + 1]), slice(drawn[k], drawn[k + 1])
-        row[0] = shape_similarity(ref.sdf[here], sdf_d[here])
-        row[1] = facing[here].mean()
-        row[2] = color[:, its_units].mean(axis=1).mean()
-        row[3] = detail[:, its_units].mean(axis=1).mean()
+    table = np.empty((len(start) - 1, 5))
+    table[:, 0] = shape_similarity(ref.sdf, sdf_d, start)
+    table[:, 1] = means(facing, start)
+    for column, of_units in ((2, color), (3, detail)):
+        table[:, column] = np.add.reduce(means(of_units, drawn), axis=0) / len(of_units)
     table[:, 4] = table[:, :4].prod(axis=1) ** 0.25
     return table
 
@@ -85,19 +83,17 @@ def likeness(product: Any, squares: Any, constant: Any) -> Any:
     return np.clip((2 * product + constant) / (squares + constant), 0.0, 1.0)
 
 
-def shape_similarity(sdf_r: Floats, sdf_d: Floats) -> float:
-    """Cube root of M S C over the samples of a patch: a mean counts on the scale of the spread.
+def shape_similarity(sdf_r: Floats, sdf_d: Floats, start: Ints) -> Floats:
+    """(G,) cube root of M S C over the samples of each patch: a mean counts on the scale of the spread.
 
-    S C = 2 sqrt(v_r v_d) / (v_r + v_d) max(0, cov / sqrt(v_r v_d)) is a likeness too: the roots cancel.
+    S C = 2 sqrt(v_r v_d) / (v_r + v_d) max(0, cov / sqrt(v_r v_d)) is a likeness too: the roots cancel. Where either
+    has no spread, they are alike if they are equal.
     """
-    mean_r, mean_d = sdf_r.mean(), sdf_d.mean()
-    r, d = sdf_r - mean_r, sdf_d - mean_d
-    var_r, var_d = np.mean(r * r), np.mean(d * d)
-    if var_r == 0 or var_d == 0:
-        return float(var_r == var_d and mean_r == mean_d)
-    spread = var_r + var_d
+    (mean_r, mean_d), (var_r, var_d, cov) = moments(sdf_r, sdf_d, start)
+    flat, equal = (var_r == 0) | (var_d == 0), (var_r == var_d) & (mean_r == mean_d)
+    spread = np.where(flat, 1.0, var_r + var_d)
     mean = likeness(mean_r * mean_d, mean_r * mean_r + mean_d * mean_d, spread)
-    return float(np.cbrt(mean * likeness(np.mean(r * d), spread, 0.0)))
+    return np.where(flat, equal, np.cbrt(mean * likeness(cov, spread, 0.0)))
 
 
 def facing_similarity(to_ref: Floats, to_dist: Floats) -> Floats:
@@ -121,33 +117,41 @@ def color_similarities(near: Pairs, units: Ints, colors_r: Floats, colors_d: Flo
     """
     first = np.searchsorted(near.row, np.arange(len(units)))
     count = np.diff(first, append=len(near.row))
+    scratch = np.empty(len(near.row))  # products come and go in one place, which stays in the cache
 
-    def mean(values: Floats) -> Floats:
-        return np.add.reduceat(values, first) / count
+    def mean(rows: Floats, times: Floats | None = None) -> Floats:
+        """(k, units) means over each unit of (k, m) rows, or of these times (m,) or (k, m) others."""
+        if times is None:
+            return np.asarray(np.add.reduceat(rows, first, axis=1) / count)
+        pairs = zip(rows, np.broadcast_to(times, rows.shape), strict=True)
+        return np.stack([np.add.reduceat(np.multiply(*pair, out=scratch), first) for pair in pairs]) / count
 
-    offset = near.offset.T.copy()  # rows that lie in one piece are summed several times faster
-    mean_offset = [mean(axis) for axis in offset]
+    offset = near.offset.T
+    mean_offset = mean(offset)
     fit = _inverse(
-        {(i, j): mean(offset[i] * offset[j]) - mean_offset[i] * mean_offset[j] + RIDGE * (i == j) for i, j in _HALF}
+        {
+            (i, j): mean(offset[i : i + 1], offset[j])[0] - mean_offset[i] * mean_offset[j] + RIDGE * (i == j)
+            for i, j in _HALF
+        }
     )
 
+    def around(colors: Floats) -> tuple[Floats, Floats]:
+        """(C, units) of p, and (C, m) of p' relative to it."""
+        rows = colors.T.copy()
+        center, relative = rows.take(units, axis=1), rows.take(near.other, axis=1)
+        relative -= center.repeat(count, axis=1)
+        return center, relative
+
     def slope(values: Floats, mean_value: Floats) -> list[Floats]:
-        cov = [
-            mean(axis * values) - mean_axis * mean_value for axis, mean_axis in zip(offset, mean_offset, strict=True)
-        ]
+        cov = [mean(values, axis) - mean_axis * mean_value for axis, mean_axis in zip(offset, mean_offset, strict=True)]
         return [a * cov[0] + b * cov[1] + c * cov[2] for a, b, c in fit]
 
-    color, detail = [], []
-    for channel_r, channel_d in zip(colors_r.T.copy(), colors_d.T.copy(), strict=True):
-        at_r, at_d = channel_r.take(units), channel_d.take(units)
-        r = channel_r.take(near.other) - at_r.repeat(count)
-        d = channel_d.take(near.other) - at_d.repeat(count)
-        mean_r, mean_d = mean(r), mean(d)
-        variances = (mean(r * r) - mean_r * mean_r) + (mean(d * d) - mean_d * mean_d)
-        contrast = likeness(mean(r * d) - mean_r * mean_d, variances, C2)
-        color.append(_of_vectors([at_r + mean_r], [at_d + mean_d], C1) * contrast)
-        detail.append(_of_vectors(slope(r, mean_r), slope(d, mean_d), K))
-    return np.stack(color), np.stack(detail)
+    (at_r, r), (at_d, d) = around(colors_r), around(colors_d)
+    mean_r, mean_d = mean(r), mean(d)
+    variances = (mean(r, r) - mean_r * mean_r) + (mean(d, d) - mean_d * mean_d)
+    contrast = likeness(mean(r, d) - mean_r * mean_d, variances, C2)
+    color = _of_vectors([at_r + mean_r], [at_d + mean_d], C1) * contrast
+    return color, _of_vectors(slope(r, mean_r), slope(d, mean_d), K)
 
 
 def _of_vectors(a: list[Floats], b: list[Floats], constant: float) -> Floats:

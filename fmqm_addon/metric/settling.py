@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .geometry import Floats, Ints, cross, dot, lengths, ranges
+from .geometry import Floats, Ints, cross, dot, first_of_each, lengths, ranges
 from .queries import closest_on
 from .stepper import Progress, Work, finish
 from .surface import Surface, triangle_normals
@@ -131,23 +131,18 @@ def _settling_edges(
         away = asked - candidates
         distance = np.sqrt(dot(away, away))
         facing = np.abs(dot(away, triangle_normals(surface.vertices, surface.triangles.take(face, axis=0))))
-        start = _starts(row)
+        start = first_of_each(row)
         count = np.diff(start, append=len(row))
         least = np.repeat(np.minimum.reduceat(distance, start), count)
         facing[distance > least + ON_SURFACE] = -1.0
         best = np.flatnonzero(facing == np.repeat(np.maximum.reduceat(facing, start), count))
-        chosen = best.take(_starts(row.take(best)))
+        chosen = best.take(first_of_each(row.take(best)))
         at = rows[here]
         triangle[at], nearest[at], weights[at] = face[chosen], candidates[chosen], candidate_weights[chosen]
         gap = candidates - candidates.take(np.repeat(chosen, count), axis=0)
         differing[row[(dot(gap, gap) > ON_SURFACE**2) & (distance < least + TIE)]] = True
         yield Progress("", 0.8)
     return rows[differing]
-
-
-def _starts(ascending: Ints) -> Ints:
-    """Where each of the values, not negative, stands for the first time."""
-    return np.flatnonzero(np.diff(ascending, prepend=-1))
 
 
 def _faces_around(triangles: Ints, vertices: Ints) -> tuple[Ints, Ints, Ints]:

@@ -204,7 +204,7 @@ class Texture:
             color += line
         if pixels.dtype == np.uint8:
             color /= 255
-        return color
+        return color.T
 
     def _taps(self, first: Floats, size: int, weights: Sequence[Any]) -> list[tuple[NDArray[np.int64], Any]]:
         """Pixel indices in [0, size), from the first, anywhere, on; each with its weight."""
@@ -212,7 +212,7 @@ class Texture:
         for step, weight in enumerate(weights):
             index = (first + step).astype(np.int64)
             if self.extension == "clip":
-                weight = weight * ((index >= 0) & (index < size))[:, None]
+                weight = weight * ((index >= 0) & (index < size))
             taps.append((self._wrap(index, size), weight))
         return taps
 
@@ -273,10 +273,16 @@ def image_arrays(part: object) -> Iterator[NDArray[Any]]:
 
 
 def _weighted_row(flat: NDArray[Any], start: NDArray[np.int64], columns: list[tuple[NDArray[np.int64], Any]]) -> Floats:
-    """(N, channels) the weighted sum over the columns of the rows that begin at start."""
-    total = flat.take(start + columns[0][0], axis=0) * columns[0][1]
+    """(channels, N) the weighted sum over the columns of the rows that begin at start."""
+
+    def weighted(column: NDArray[np.int64], weight: Any) -> Floats:
+        values: Floats = flat.take(start + column, axis=0).T.astype(np.float64, order="C")
+        values *= weight
+        return values
+
+    total = weighted(*columns[0])
     for column, weight in columns[1:]:
-        total += flat.take(start + column, axis=0) * weight
+        total += weighted(column, weight)
     return total
 
 
@@ -289,10 +295,10 @@ def _fold(x: Floats, fold: Fold) -> Floats:
 
 
 def _linear_weights(t: Floats) -> list[Floats]:
-    return [(1 - t)[:, None], t[:, None]]
+    return [1 - t, t]
 
 
 def _cubic_weights(t: Floats) -> list[Floats]:
     """The uniform cubic B-spline of the pixels at -1, 0, 1, 2 for places t in [0, 1)."""
     s = 1 - t
-    return [w[:, None] / 6 for w in (s**3, 3 * t**3 - 6 * t**2 + 4, 3 * s**3 - 6 * s**2 + 4, t**3)]
+    return [w / 6 for w in (s**3, 3 * t**3 - 6 * t**2 + 4, 3 * s**3 - 6 * s**2 + 4, t**3)]

@@ -234,7 +234,8 @@ def test_moments_of_a_nearly_plain_unit_do_not_cancel(seed: int, exponent: float
 
 @given(cases)
 def test_geometry_gradients(case: Case) -> None:
-    found = geometry_gradient_similarity(case.ref.nearest - case.positions, case.dist.nearest - case.positions)
+    towards = (case.ref.nearest - case.positions, case.dist.nearest - case.positions)
+    found = float(geometry_gradient_similarity(*towards, np.array([0, len(case.positions)]))[0])
     assert found == pytest.approx(gradient_cosines(case.positions, case.ref.nearest, case.dist.nearest), rel=1e-9)
     assert 0 <= found <= 1
 
@@ -254,7 +255,8 @@ def test_geometry_gradients(case: Case) -> None:
     ],
 )
 def test_geometry_gradients_by_hand(ref: list[list[float]], dist: list[list[float]], expected: float) -> None:
-    assert geometry_gradient_similarity(np.array(ref, float), np.array(dist, float)) == pytest.approx(expected)
+    found = geometry_gradient_similarity(np.array(ref, float), np.array(dist, float), np.array([0, len(ref)]))
+    assert found.tolist() == pytest.approx([expected])
 
 
 @given(cases, st.sampled_from([0.1, 0.3, math.inf]))
@@ -297,6 +299,11 @@ def gradients(*units: tuple[float, Sequence[float]]) -> Gradient:
     return Gradient(magnitude, np.array([[step for _, step in units]] * 3, float))
 
 
+def similarity_of_gradients(ref: Gradient, dist: Gradient, weights: Floats) -> float:
+    """Of a patch that has all the units."""
+    return float(gradient_similarity(ref, dist, np.array([0, ref.magnitude.shape[1]]), weights)[0])
+
+
 X, Y, XY, NONE = (1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (1.0, 1.0, 0.0), (0.0, 0.0, 0.0)
 
 
@@ -321,7 +328,7 @@ def test_gradient_similarity_by_hand(
     magnitude: float,
 ) -> None:
     for one, other in ((ref, dist), (dist, ref)):
-        found = gradient_similarity(gradients(*one), gradients(*other), RGB)
+        found = similarity_of_gradients(gradients(*one), gradients(*other), RGB)
         assert found == pytest.approx(math.sqrt(angular * magnitude), abs=1e-5)
 
 
@@ -329,11 +336,11 @@ def test_channels_are_weighed_6_1_1_in_lab() -> None:
     """Only the first channel differs: 6 of 8 parts in Lab, one of 3 in RGB; A and G alike."""
     ref, dist = gradients((1, X)), gradients((1, X))
     dist.step[0, 0] = XY
-    assert gradient_similarity(ref, dist, RGB) == pytest.approx(math.sqrt((2 + math.sqrt(0.5)) / 3))
-    assert gradient_similarity(ref, dist, LAB) == pytest.approx(math.sqrt((2 + 6 * math.sqrt(0.5)) / 8))
+    assert similarity_of_gradients(ref, dist, RGB) == pytest.approx(math.sqrt((2 + math.sqrt(0.5)) / 3))
+    assert similarity_of_gradients(ref, dist, LAB) == pytest.approx(math.sqrt((2 + 6 * math.sqrt(0.5)) / 8))
     dist = gradients((1, X))
     dist.magnitude[0, 0] = 3
-    assert gradient_similarity(ref, dist, LAB) == pytest.approx(math.sqrt((2 + 6 * (1 - math.sqrt(0.8))) / 8))
+    assert similarity_of_gradients(ref, dist, LAB) == pytest.approx(math.sqrt((2 + 6 * (1 - math.sqrt(0.8))) / 8))
 
 
 # --- a whole patch ----------------------------------------------------------------------------------------

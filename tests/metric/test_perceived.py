@@ -117,7 +117,12 @@ def test_a_point_between_the_surfaces_is_inside_one_of_them() -> None:
     ],
 )
 def test_shape_by_hand(r: list[float], d: list[float], expected: float) -> None:
-    assert shape_similarity(np.array(r, float), np.array(d, float)) == pytest.approx(expected, abs=1e-12)
+    """Alone, and beside patches of other sizes."""
+    one, more = [0.5, -1.0, 0.25], np.array([0, 3, 3 + len(r)])
+    alone = shape_similarity(np.array(r, float), np.array(d, float), np.array([0, len(r)]))
+    beside = shape_similarity(np.array([*one, *r], float), np.array([*one, *d], float), more)
+    assert alone.tolist() == pytest.approx([expected], abs=1e-12)
+    assert beside.tolist() == pytest.approx([1, expected], abs=1e-12)
 
 
 # --- facing -----------------------------------------------------------------------------------------------
