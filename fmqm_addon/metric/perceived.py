@@ -7,6 +7,7 @@ Equal inputs cancel exactly, as in the paper's features: both sides of a ratio c
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -119,19 +120,20 @@ def color_similarities(near: Pairs, units: Ints, colors_r: Floats, colors_d: Flo
     count = np.diff(first, append=len(near.row))
     scratch = np.empty(len(near.row))  # products come and go in one place, which stays in the cache
 
-    def mean(rows: Floats, times: Floats | None = None) -> Floats:
-        """(k, units) means over each unit of (k, m) rows, or of these times (m,) or (k, m) others."""
-        if times is None:
-            return np.asarray(np.add.reduceat(rows, first, axis=1) / count)
-        pairs = zip(rows, np.broadcast_to(times, rows.shape), strict=True)
-        return np.stack([np.add.reduceat(np.multiply(*pair, out=scratch), first) for pair in pairs]) / count
+    def mean(rows: Sequence[Floats] | Floats, times: Sequence[Floats] | Floats) -> Floats:
+        """(k, units) means over each unit of (k, m) values times others."""
+        sums = np.empty((len(rows), len(units)))
+        for total, row, other in zip(sums, rows, times, strict=True):
+            np.add.reduceat(np.multiply(row, other, out=scratch), first, out=total)
+        return sums / count
 
     offset = near.offset.T
-    mean_offset = mean(offset)
+    mean_offset = np.add.reduceat(offset, first, axis=1) / count
+    seconds = mean([offset[i] for i, _ in _HALF], [offset[j] for _, j in _HALF])
     fit = _inverse(
         {
-            (i, j): mean(offset[i : i + 1], offset[j])[0] - mean_offset[i] * mean_offset[j] + RIDGE * (i == j)
-            for i, j in _HALF
+            (i, j): second - mean_offset[i] * mean_offset[j] + RIDGE * (i == j)
+            for (i, j), second in zip(_HALF, seconds, strict=True)
         }
     )
 
@@ -143,11 +145,14 @@ def color_similarities(near: Pairs, units: Ints, colors_r: Floats, colors_d: Flo
         return center, relative
 
     def slope(values: Floats, mean_value: Floats) -> list[Floats]:
-        cov = [mean(values, axis) - mean_axis * mean_value for axis, mean_axis in zip(offset, mean_offset, strict=True)]
+        cov = [
+            mean(values, [axis] * len(values)) - mean_axis * mean_value
+            for axis, mean_axis in zip(offset, mean_offset, strict=True)
+        ]
         return [a * cov[0] + b * cov[1] + c * cov[2] for a, b, c in fit]
 
     (at_r, r), (at_d, d) = around(colors_r), around(colors_d)
-    mean_r, mean_d = mean(r), mean(d)
+    mean_r, mean_d = (np.add.reduceat(values, first, axis=1) / count for values in (r, d))
     variances = (mean(r, r) - mean_r * mean_r) + (mean(d, d) - mean_d * mean_d)
     contrast = likeness(mean(r, d) - mean_r * mean_d, variances, C2)
     color = _of_vectors([at_r + mean_r], [at_d + mean_d], C1) * contrast

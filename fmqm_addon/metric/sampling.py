@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .geometry import Floats, Ints
+from .geometry import Floats, Ints, weighted
 from .patches import Patch, PatchMesh
 from .settings import Settings
 from .surface import triangle_normals
@@ -55,9 +55,9 @@ def draw_samples(mesh: PatchMesh, patch: Patch, total_area: float, settings: Set
 
     weights = draw_barycentric(rng, count)
     offset = rng.normal(0.0, settings.sigma * patch.diagonal, count)
-    corners = mesh.triangles[face]
-    positions = np.einsum("nk,nkc->nc", weights, mesh.vertices[corners])
-    positions += offset[:, None] * triangle_normals(mesh.vertices, corners)
+    corners = mesh.triangles.take(face, axis=0)
+    positions = weighted(weights, *(mesh.vertices.take(corners[:, k], axis=0) for k in range(3)))
+    positions += (offset * triangle_normals(mesh.vertices, corners).T).T
     units = np.sort(rng.choice(count, min(settings.color_units, count), replace=False))
     return PatchSamples(positions, offset, face, units)
 
@@ -103,7 +103,7 @@ def join_samples(parts: list[PatchSamples]) -> Samples:
     for part, first in zip(parts, start.tolist(), strict=False):
         unit[first + part.units] = True
     return Samples(
-        positions=np.concatenate([part.positions for part in parts]),
+        positions=np.concatenate([part.positions for part in parts], out=np.empty((len(unit), 3))),
         offset=np.concatenate([part.offset for part in parts]),
         patch=np.repeat(np.arange(len(parts), dtype=np.int32), counts),
         start=start,

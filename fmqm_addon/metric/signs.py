@@ -39,13 +39,15 @@ def followers(points: Floats, distances: Floats) -> Work[Ints]:
     for first in range(0, len(points), _BATCH):
         alone = np.arange(first, min(first + _BATCH, len(points)))
         for back in range(1, PREDECESSORS + 1):
-            alone = alone[alone >= back]
+            if first == 0:
+                alone = alone[alone >= back]
             before = alone - back
             apart = points.take(alone, axis=0) - points.take(before, axis=0)
             reach = np.maximum(radius.take(alone), radius.take(before))
             together = dot(apart, apart) < reach * reach
-            leader[alone[together]] = before[together]
-            alone = alone[~together]
+            following = np.flatnonzero(together)
+            leader[alone.take(following)] = before.take(following)
+            alone = alone.take(np.flatnonzero(~together))
         yield Progress("", min(1.0, (first + _BATCH) / len(points)))
     while True:  # the leader's leader, until there is none above
         above = leader.take(leader)
