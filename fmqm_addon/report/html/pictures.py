@@ -18,13 +18,13 @@ from ...metric.errors import FileError, OutputError
 from ...metric.evaluation import Result
 from ...metric.surface import Surface
 from ..atomic_files import check_writable, replaced
+from ..picture_files import SUFFIXES, encode, require_encoder
 from ..render import (
     Camera,
     Pixels,
     is_seen,
     natural_aspect,
     render,
-    require_pillow,
     score_by_face,
     three_views,
 )
@@ -37,16 +37,15 @@ VIEW_AREA = 560**2  # pixels of a view of the whole
 CLOSE_UP = 288  # pixels; width and height of a close-up
 CLOSE_UPS = 3  # worst patches that are shown
 CLOSE_UP_MARGIN = 1.2  # a close-up is so many patch diagonals wide
-JPEG_QUALITY = 92  # with full color resolution: what is shown may be the artifacts of a texture
 
 
 def open_report_folder(folder: str) -> None:
     """Makes the folder of a report, and says early, before minutes of work, what would fail.
 
     Raises:
-        FMQMError: Pillow is missing. FileError: the folder cannot be made or written to.
+        FMQMError: nothing encodes pictures. FileError: the folder cannot be made or written to.
     """
-    require_pillow()
+    require_encoder()
     try:
         os.makedirs(os.path.join(folder, PICTURES), exist_ok=True)
     except OSError as error:
@@ -147,13 +146,12 @@ def _close_ups(
 
 
 def _write(folder: str, stem: str, view: Pixels) -> str:
-    """A JPEG; returns its path relative to the folder."""
-    from PIL import Image
-
-    name = f"{PICTURES}/{stem}.jpg"
+    """A picture's file; returns its path relative to the folder."""
+    data, kind = encode(view)
+    name = f"{stem}{SUFFIXES[kind]}"
     try:
-        with replaced(os.path.join(folder, PICTURES, f"{stem}.jpg")) as temporary:
-            Image.fromarray(view).save(temporary, "JPEG", quality=JPEG_QUALITY, subsampling=0, optimize=True)
+        with replaced(os.path.join(folder, PICTURES, name)) as temporary:
+            Path(temporary).write_bytes(data)
     except FileError as error:
         raise OutputError(str(error)) from error
-    return name
+    return f"{PICTURES}/{name}"

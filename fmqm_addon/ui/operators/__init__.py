@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The sidebar's buttons."""
 
-from . import chain, decimate, inputs, live, measure, pick, presets, probe, results, save, screen_sizes, view
+from . import chain, decimate, inputs, live, measure, pick, presets, probe, report, results, save, screen_sizes, view
 
 CLASSES: tuple[type, ...] = (
     *inputs.CLASSES,
@@ -10,6 +10,7 @@ CLASSES: tuple[type, ...] = (
     *presets.CLASSES,
     *results.CLASSES,
     *save.CLASSES,
+    *report.CLASSES,
     *view.CLASSES,
     *pick.CLASSES,
     *probe.CLASSES,

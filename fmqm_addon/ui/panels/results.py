@@ -150,6 +150,7 @@ class FMQM_PT_results(Sidebar, bpy.types.Panel):  # noqa: N801
         row = layout.row()
         row.operator_context = "INVOKE_DEFAULT"
         row.operator("fmqm.screen_sizes")
+        row.operator("fmqm.report")
         row = layout.row(align=True)
         row.operator_context = "INVOKE_DEFAULT"
         row.label(text="Save")

@@ -5,19 +5,18 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import io
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...picture_files import encode, shrunk
 from .skins import LARGEST_SIDE
 
 MOST_PIXELS = 4 * LARGEST_SIDE**2  # of the images of a mesh
 MOST_BYTES = 3_800_000  # of them, as text; a pair of 200,000 triangles stays below 25 MB with it, whatever it is
 _SMALLEST_SIDE = 64
 _LOSSLESS_SIDE = 512  # pixels; what is smaller stays as it is to the bit
-_JPEG_QUALITY = 92  # with full color resolution, as in the pictures
 
 Encoded = tuple[str, str]  # a digest of the content, and the data URI
 
@@ -56,17 +55,8 @@ def _pixels(image: NDArray[np.uint8], side: int) -> int:
 
 
 def _encoded(image: NDArray[np.uint8], side: int) -> Encoded:
-    from PIL import Image
-
-    picture, size = Image.fromarray(image), _size(image, side)
-    if size != picture.size:
-        picture = picture.resize(size, Image.Resampling.BOX)
-    digest = hashlib.sha256(f"{size}".encode() + picture.tobytes()).hexdigest()[:16]
-    out = io.BytesIO()
-    if max(size) <= _LOSSLESS_SIDE:
-        picture.save(out, "PNG")
-        kind = "png"
-    else:
-        picture.save(out, "JPEG", quality=_JPEG_QUALITY, subsampling=0)
-        kind = "jpeg"
-    return digest, f"data:image/{kind};base64,{base64.b64encode(out.getvalue()).decode()}"
+    size = _size(image, side)
+    pixels = image if size == image.shape[1::-1] else shrunk(image, size)
+    digest = hashlib.sha256(f"{size}".encode() + pixels.tobytes()).hexdigest()[:16]
+    data, kind = encode(pixels, lossless=max(size) <= _LOSSLESS_SIDE)
+    return digest, f"data:image/{kind};base64,{base64.b64encode(data).decode()}"
