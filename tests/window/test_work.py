@@ -60,7 +60,7 @@ def test_live_leaves_no_mark(found: dict[str, Any]) -> None:
 def test_a_chain_is_there_or_not(found: dict[str, Any]) -> None:
     assert found["left of a cancelled chain"] == []
     assert found["made"] == ["objects Rock_LOD0", "objects Rock_LOD1", "objects Rock_LOD2"]
-    assert found["rows"] == {"Rock_LOD1": [True, ""], "Rock_LOD2": [True, ""]}
+    assert found["rows"] == [["Rock_LOD1", ""], ["Rock_LOD2", ""]]
     assert found["after undo"] == ["Rock"], "one step"
 
 
