@@ -57,7 +57,8 @@ def encode(pixels: Pixels, lossless: bool = False) -> EncodedPicture:
     if lossless:
         image.save(out, "PNG")
         return EncodedPicture(out.getvalue(), "png")
-    image.save(out, "JPEG", quality=JPEG_QUALITY, subsampling=0, optimize=True)
+    # Not optimized: Pillow gives up where that takes more than a byte a pixel, as of noise.
+    image.save(out, "JPEG", quality=JPEG_QUALITY, subsampling=0)
     return EncodedPicture(out.getvalue(), "jpeg")
 
 

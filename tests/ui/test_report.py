@@ -101,6 +101,12 @@ def test_without_anything_to_encode_pictures_it_is_said(monkeypatch: pytest.Monk
         encode(np.zeros((1, 1, 3), np.uint8))
 
 
+def test_noise_can_be_encoded() -> None:
+    """It takes more than a byte a pixel."""
+    noise = np.random.default_rng(0).integers(0, 256, (300, 300, 3), dtype=np.uint8)
+    assert len(encode(noise).data) > 300 * 300
+
+
 def test_shrunk_pictures_are_means() -> None:
     pixels = np.random.default_rng(0).integers(0, 256, (12, 9, 3), dtype=np.uint8)
     quarters = pixels.reshape(3, 4, 3, 3, 3).mean(axis=(1, 3))

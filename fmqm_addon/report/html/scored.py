@@ -72,10 +72,11 @@ def _record(folder: str, pair: ScoredPair, judge: Judge, files: dict[int, Refere
         given, whole = (surface.preparation.given for surface in (distorted, reference))
         stem = picture_stem(score.reference, score.distorted)
         if id(reference) not in files:
-            files[id(reference)] = write_reference_data(folder, reference)
+            own = picture_stem(str(len(files)), score.reference)  # it may have changed between two measurements
+            files[id(reference)] = write_reference_data(folder, own, reference)
         findings = {
             "pictures": write_pair_pictures(folder, stem, reference, distorted, result, judge),
-            "viewer": write_pair_data(folder, files[id(reference)], distorted, result, judge),
+            "viewer": write_pair_data(folder, stem, files[id(reference)], distorted, result, judge),
             "where": where(reference, result),
         }
         costs = Costs(given, given / whole, texture_bytes(distorted))
