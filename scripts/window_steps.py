@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 import bpy
 
 DRAWN = 6  # seconds until a change is on the screen, drawn by software
+DONE = 2  # and until the window has done what nobody takes a picture of
 
 
 def view() -> tuple[bpy.types.Window, bpy.types.Area]:
@@ -48,7 +49,7 @@ def play(
             failed(traceback.format_exc())
             builtins.done()
             return None
-        bpy.app.timers.register(lambda: picture(name), first_interval=DRAWN)
+        bpy.app.timers.register(lambda: picture(name), first_interval=DRAWN if name else DONE)
         return None
 
     def picture(name: str) -> None:

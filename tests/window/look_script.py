@@ -193,11 +193,88 @@ def other_layer() -> None:
     bpy.context.scene.fmqm.look.layer = "SDF_COMPARED"
 
 
+def mouse(kind: str, value: str, x: float, y: float) -> None:
+    """Something that the mouse does, in pixels of the view's main region."""
+    window, area = view()
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    window.event_simulate(type=kind, value=value, x=round(region.x + x), y=round(region.y + y))
+
+
+def drag(x: float, y: float, up: float) -> None:
+    mouse("MOUSEMOVE", "NOTHING", x + 1, y + 25)
+    mouse("MOUSEMOVE", "NOTHING", x, y)
+    mouse("LEFTMOUSE", "PRESS", x, y)
+    for share in (0.25, 0.5, 0.75, 1.0):
+        mouse("MOUSEMOVE", "NOTHING", x, y + share * up)
+    mouse("LEFTMOUSE", "RELEASE", x, y + up)
+
+
+def module(name: str) -> ModuleType:
+    return sys.modules[f"bl_ext.user_default.fmqm.fmqm_addon.ui.view.{name}"]
+
+
+def in_view(place: Vector) -> Vector:
+    """Pixels of the view's main region."""
+    _, area = view()
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    return location_3d_to_region_2d(region, area.spaces.active.region_3d, place)
+
+
+def drag_legend() -> None:
+    """The lower end of the color bar, by half of its height; no operator runs."""
+    x, y, width, height = module("overlay").bars[view()[1].as_pointer()]
+    REPORT["ends"] = module("heat").shown_in(bpy.context.scene).ends
+    drag(x + width / 2, y, height / 2)
+
+
+def show_slice() -> None:
+    look = bpy.context.scene.fmqm.look
+    REPORT["ends dragged"], REPORT["range"] = module("heat").shown_in(bpy.context.scene).ends, look.range
+    look.range, look.show_slice, look.slice_axis = "FITTED", True, "Z"
+
+
+def drag_slice() -> None:
+    """By its arrow, upwards from the middle."""
+    middle, _ = module("slice_plane").way(bpy.context.scene, view()[1].spaces.active)
+    x, y = in_view(middle)
+    drag(x, y + 40, 30)
+
+
+def slice_in_front() -> None:
+    look = bpy.context.scene.fmqm.look
+    REPORT["offset"], REPORT["blocks slice"] = look.slice_offset, blocks()
+    look.slice_axis, look.slice_offset = "Y", -100
+
+
+def probe() -> None:
+    bpy.context.scene.fmqm.look.show_slice = False
+    bpy.ops.fmqm.probe("INVOKE_DEFAULT")
+
+
+def point() -> None:
+    """At the LOD's forehead."""
+    mouse("MOUSEMOVE", "NOTHING", *in_view(Vector((2.6, -0.7, 0.4))))
+
+
+def pointed() -> None:
+    hint = module("overlay").hint
+    REPORT["hint"] = None if hint is None else hint.lines
+    for value in ("PRESS", "RELEASE"):
+        mouse("ESC", value, 300, 300)
+
+
 STEPS: list[tuple[Callable[[], object], str]] = [
     (start, ""),
     (lambda: None, "before"),
     (measure, ""),
     (shown, "look"),
+    (drag_legend, ""),
+    (show_slice, ""),
+    (drag_slice, ""),
+    (slice_in_front, "slice"),
+    (probe, ""),
+    (point, ""),
+    (pointed, ""),
     (xray, "xray"),
     (overlays_off, "overlays off"),
     (points, "points"),

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reads pictures of the program's window: is what the add-on shows really on the screen, without any switch?
 
-FMQM_SCREENSHOT names a command `... SCRIPT OUT_PREFIX` that opens Blender's window, runs the script with
-shot(name) and done() in builtins, and saves OUT_PREFIX-name.png.
+FMQM_SCREENSHOT names a command `... SCRIPT OUT_PREFIX [arguments of Blender]` that opens Blender's window, runs the
+script with shot(name) and done() in builtins, and saves OUT_PREFIX-name.png.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from tests.house.test_extension import ROOT, package  # noqa: F401  the fixture
 
 pytestmark = pytest.mark.program
 Pixels = np.ndarray
+SCRIPT = Path(__file__).with_name("look_script.py")
 REPORT: dict[str, object] = {}  # what the script wrote down
 
 
@@ -32,7 +33,7 @@ def pictures(tmp_path_factory: pytest.TempPathFactory, package: Path) -> dict[st
     image = pytest.importorskip("PIL.Image")
     out = tmp_path_factory.mktemp("pictures")
     done = subprocess.run(
-        [*shlex.split(command), str(Path(__file__).with_name("look_script.py")), str(out / "view")],
+        [*shlex.split(command), str(SCRIPT), str(out / "view"), "--enable-event-simulate"],
         env={**os.environ, "FMQM_ZIP": str(package), "FMQM_OUT": str(out), "FMQM_ROOT": str(ROOT)},
         capture_output=True,
         text=True,
@@ -100,6 +101,25 @@ def test_nothing_of_it_gets_anywhere(pictures: dict[str, Pixels]) -> None:
 @pytest.mark.parametrize("name", ["xray", "overlays off"])
 def test_gone_in_xray_and_without_overlays(pictures: dict[str, Pixels], name: str) -> None:
     assert saturated(center(pictures[name])) < 1000 + saturated(center(pictures["before"]))
+
+
+def test_an_end_of_the_legend_is_dragged_by_the_mouse(pictures: dict[str, Pixels]) -> None:
+    low, high = REPORT["ends"]  # type: ignore[misc]
+    assert REPORT["ends dragged"] == pytest.approx([(low + high) / 2, high], abs=0.02 * (high - low))
+    assert REPORT["range"] == "CUSTOM"
+
+
+def test_the_slice_is_drawn_and_dragged_by_its_arrow(pictures: dict[str, Pixels]) -> None:
+    """At its front end it stands before both; the file has nothing of it."""
+    assert REPORT["blocks slice"] == REPORT["blocks"] and 5 < REPORT["offset"] < 95  # type: ignore[operator]
+    changed = np.abs(center(pictures["slice"]) - center(pictures["look"])).max(axis=2) > 0.1
+    assert changed.mean() > 0.05
+
+
+def test_the_probe_tells_what_is_under_the_mouse(pictures: dict[str, Pixels]) -> None:
+    lines = REPORT["hint"]
+    assert isinstance(lines, list) and len(lines) == 6
+    assert lines[0].startswith("LOD, patch ") and all(0 <= float(line.split()[-1]) <= 1 for line in lines[1:])
 
 
 def test_clear_puts_the_view_back(pictures: dict[str, Pixels]) -> None:

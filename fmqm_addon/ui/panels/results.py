@@ -183,7 +183,8 @@ def _draw_verdict(layout: bpy.types.UILayout, context: bpy.types.Context, fmqm: 
     record = pair_record(pair_of(row)) if is_whole(row) else None
     if record is not None:
         heading = record["impairment"]
-        box.label(text=heading[:1].upper() + heading[1:], icon_value=swatch(scores["perceived"]))
+        head = box.column()
+        wrapped(head, context, heading[:1].upper() + heading[1:], icon_value=swatch(scores["perceived"]))
         note = box.column()
         wrapped(note, context, _beginning(verdict(record)))
     numbers = box.column(align=True)

@@ -27,14 +27,18 @@ class OfResult(Sidebar):
         return row is not None and row_scores(row) is not None
 
 
-def wrapped(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "NONE") -> None:
-    """A label of as many lines as the sidebar's width asks for."""
+def wrapped(
+    layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "NONE", icon_value: int = 0
+) -> None:
+    """A label of as many lines as the sidebar's width asks for; its icon by name, or by the number of one of ours."""
     column = layout.column(align=True)
     column.scale_y = 0.8
-    first = True
-    for line in _lines(text, room(context, 70 if icon != "NONE" else 50)):
-        column.label(text=line, icon=icon if first else ("BLANK1" if icon != "NONE" else "NONE"))
-        first = False
+    has_icon = icon != "NONE" or icon_value != 0
+    for number, line in enumerate(_lines(text, room(context, 70 if has_icon else 50))):
+        if number == 0 and icon_value:
+            column.label(text=line, icon_value=icon_value)
+        else:
+            column.label(text=line, icon=icon if number == 0 else "BLANK1" if has_icon else "NONE")
 
 
 def cut_in_the_middle(text: str, room: int) -> str:

@@ -81,6 +81,7 @@ class FMQM_PT_worst(OfResult, bpy.types.Panel):  # noqa: N801
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, look = self.layout, look_of(context.scene)
+        _say_if_gone(layout, context)
         if len(look.worst):
             layout.template_list("FMQM_UL_worst", "", look, "worst", look, "worst_index", rows=4, maxrows=8)
         row = layout.row(align=True)
@@ -98,6 +99,7 @@ class FMQM_PT_ncf(OfResult, bpy.types.Panel):  # noqa: N801
     def draw(self, context: bpy.types.Context) -> None:
         layout, look = self.layout, look_of(context.scene)
         layout.use_property_split, layout.use_property_decorate = True, False
+        _say_if_gone(layout, context)
         column = layout.column(align=True)
         column.label(text="Units of One Sample")
         column.operator(FMQM_OT_unit_pick.bl_idname, icon="EYEDROPPER")
