@@ -116,15 +116,32 @@ class Page:
 
     def drag(self, selector: str, right: int, down: int) -> None:
         """With the mouse, from the middle of the element, in steps."""
-        x, y = self.run(
-            f"(() => {{ const r = document.querySelector({json.dumps(selector)}).getBoundingClientRect();"
-            "return [r.x + r.width / 2, r.y + r.height / 2] })()"
-        )
+        x, y = self._middle(selector)
         self._call("Input.dispatchMouseEvent", type="mousePressed", x=x, y=y, button="left", clickCount=1)
         for k in (1, 2, 3):
             at = {"x": x + right * k / 3, "y": y + down * k / 3}
             self._call("Input.dispatchMouseEvent", type="mouseMoved", **at, button="left", buttons=1)
         self._call("Input.dispatchMouseEvent", type="mouseReleased", **at, button="left", clickCount=1)
+
+    def swipe(self, selector: str, right: int, down: int) -> None:
+        """With a finger, from the middle of the element, in steps."""
+        x, y = self._middle(selector)
+        for kind, share in (("touchStart", 0.0), ("touchMove", 0.5), ("touchMove", 1.0)):
+            points = [{"x": x + right * share, "y": y + down * share}]
+            self._call("Input.dispatchTouchEvent", type=kind, touchPoints=points)
+        self._call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+
+    def wheel(self, selector: str, down: int) -> None:
+        """Over the middle of the element."""
+        x, y = self._middle(selector)
+        self._call("Input.dispatchMouseEvent", type="mouseWheel", x=x, y=y, deltaX=0, deltaY=down)
+
+    def _middle(self, selector: str) -> tuple[float, float]:
+        x, y = self.run(
+            f"(() => {{ const r = document.querySelector({json.dumps(selector)}).getBoundingClientRect();"
+            "return [r.x + r.width / 2, r.y + r.height / 2] })()"
+        )
+        return x, y
 
     def picture_of(self, selector: str) -> bytes:
         """A PNG of an element that is in view."""

@@ -144,6 +144,8 @@ def test_it_turns_by_mouse_and_keys_and_back(page: Page, report: Path) -> None:
     page.press("ArrowLeft")
     turned = pixels(page)
     assert (np.abs(turned - dragged) > 20).mean() > 0.01
+    page.wheel(".viewer-stage", -400)
+    assert drawn(pixels(page)).mean() > 1.1 * drawn(turned).mean()  # nearer
     page.run("document.querySelector('.viewer-choices button').click()")
     inside = (slice(10, -10), slice(10, -10))  # the outline shows what has the focus
     assert (np.abs(landed(page) - first)[inside] > 20).mean() < 0.001
@@ -262,6 +264,9 @@ def test_a_phone_has_the_wipe_first_and_all_in_its_width(page: Page, report: Pat
         assert page.run("document.documentElement.scrollWidth") == 375 and page.run(outside) == 0
     colors = "getComputedStyle(document.querySelector('.viewer-stage')).backgroundColor"
     assert (sum(map(int, re.findall(r"\d+", page.run(colors))[:3])) < 300) == dark
+    before = pixels(page)
+    page.swipe(".viewer-stage", 60, 20)
+    assert (np.abs(pixels(page) - before) > 20).mean() > 0.01
     assert page.messages == []
 
 
@@ -271,7 +276,8 @@ def test_without_webgl_the_pictures_stay(program: str, report: Path) -> None:
         page.run(OPEN)
         assert "the pictures show the same" in page.run("document.querySelector('.viewer-said').textContent")
         loading = (
-            "Promise.all([...document.images].map((i) => { i.loading = 'eager'; return i.decode(); })).then(() => 1)"
+            "Promise.all([...document.querySelectorAll('img[src]')].map((i) => "
+            "{ i.loading = 'eager'; return i.decode(); })).then(() => 1)"
         )
         assert page.run(loading) == 1 and page.run("document.images.length") >= 3
         assert page.run("document.querySelectorAll('canvas').length") == 0
