@@ -12,8 +12,7 @@ from collections.abc import Callable, Sequence
 
 import bpy
 
-DRAWN = 6  # seconds until a change is on the screen, drawn by software
-DONE = 2  # and until the window has done what nobody takes a picture of
+DRAWN = 1  # seconds from the drawing of a view until it is on the screen
 
 
 def view() -> tuple[bpy.types.Window, bpy.types.Area]:
@@ -22,20 +21,34 @@ def view() -> tuple[bpy.types.Window, bpy.types.Area]:
 
 
 def play(
-    steps: Sequence[tuple[Callable[[], object], str]], measuring: Callable[[], bool], failed: Callable[[str], object]
+    steps: Sequence[tuple[Callable[[], object], str]],
+    measuring: Callable[[], bool],
+    failed: Callable[[str], object],
+    rest: float = DRAWN,
 ) -> None:
     """Runs the steps one after the other once the window is there.
 
     Args:
         steps: what to do, and the name of the picture that is taken afterwards; "" takes none.
-        measuring: whether a modal operator is at work, whose own timer drives it; steps wait for it.
+        measuring: whether there is work with a timer of its own that drives it; steps and pictures wait for its end.
         failed: is told the traceback of a step.
+        rest: seconds from when the view was drawn to the next step.
     """
     waiting = list(steps)
+    drawn: list[bool] = []  # one for each time since the last step, or since the work that it began
+    bpy.types.SpaceView3D.draw_handler_add(lambda: drawn.append(True), (), "WINDOW", "POST_PIXEL")
+
+    def is_drawn() -> bool:
+        """Whether the view is on the screen as it is now: it is when the next drawing has begun."""
+        if measuring():
+            drawn.clear()
+        elif len(drawn) < 2:
+            view()[1].tag_redraw()
+        return len(drawn) >= 2
 
     def step() -> float | None:
-        if measuring():
-            return 0.5
+        if not is_drawn():
+            return 0.2
         if not waiting:
             builtins.done()
             return None
@@ -49,12 +62,21 @@ def play(
             failed(traceback.format_exc())
             builtins.done()
             return None
-        bpy.app.timers.register(lambda: picture(name), first_interval=DRAWN if name else DONE)
+        drawn.clear()
+        bpy.app.timers.register(lambda: picture(name), first_interval=0.1)
         return None
 
-    def picture(name: str) -> None:
+    def picture(name: str) -> float | None:
+        if not is_drawn():
+            return 0.2
         if name:
-            builtins.shot(name)
+            bpy.app.timers.register(lambda: shoot(name), first_interval=rest)
+        else:
+            bpy.app.timers.register(step, first_interval=rest)
+        return None
+
+    def shoot(name: str) -> None:
+        builtins.shot(name)
         bpy.app.timers.register(step, first_interval=0.1)
 
     bpy.app.timers.register(step, first_interval=3)

@@ -20,56 +20,19 @@ import numpy as np
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Vector
 
-sys.path.insert(0, os.path.join(os.environ["FMQM_ROOT"], "scripts"))
+sys.path[:0] = [os.path.join(os.environ["FMQM_ROOT"], *parts) for parts in (("scripts",), ("tests", "window"))]
+from monkeys import build
 from window_steps import play, view
 
 OUT = Path(os.environ["FMQM_OUT"])
 REPORT: dict[str, object] = {}
 
 
-def texture() -> bpy.types.Material:
-    image = bpy.data.images.new("Checks", 64, 64)
-    pixels = np.ones((64, 64, 4), np.float32)
-    pixels[..., :3] = np.random.default_rng(0).random((8, 8, 3)).repeat(8, axis=0).repeat(8, axis=1)
-    image.pixels.foreach_set(pixels.ravel())
-    material = bpy.data.materials.new("Checks")
-    nodes, links = material.node_tree.nodes, material.node_tree.links
-    node = nodes.new("ShaderNodeTexImage")
-    node.image = image
-    shader = next(node for node in nodes if node.type == "BSDF_PRINCIPLED")
-    links.new(node.outputs["Color"], shader.inputs["Base Color"])
-    return material
-
-
-def build() -> None:
-    """A monkey, and beside it the same one of which the left half has lost many of its triangles."""
-    for object_ in [o for o in bpy.data.objects if o.type == "MESH"]:
-        bpy.data.objects.remove(object_)
-    material = texture()
-    objects = []
-    for name, x in (("Monkey_LOD0", 0.0), ("Monkey_LOD1", 2.6)):
-        bpy.ops.mesh.primitive_monkey_add(location=(x, 0, 0))
-        object_ = bpy.context.object
-        object_.name = name
-        object_.data.materials.append(material)
-        object_.modifiers.new("Fine", "SUBSURF").levels = 2
-        objects.append(object_)
-    left = objects[1].vertex_groups.new(name="Left")
-    left.add([v.index for v in objects[1].data.vertices if v.co.x < 0], 1.0, "REPLACE")
-    decimate = objects[1].modifiers.new("Coarse", "DECIMATE")
-    decimate.ratio, decimate.vertex_group = 0.55, "Left"
-    bpy.ops.mesh.primitive_cube_add(location=(5.2, 0, 0))
-    fmqm = bpy.context.scene.fmqm
-    fmqm.reference = objects[0]
-    fmqm.compared.add().object = objects[1]
-    fmqm.settings.samples, fmqm.settings.patches = 60_000, 150
-
-
 def start() -> None:
     bpy.ops.extensions.package_install_files(
         filepath=os.environ["FMQM_ZIP"], repo="user_default", enable_on_install=True
     )
-    build()
+    build(samples=60_000, patches=150)
     _, area = view()
     area.spaces.active.show_region_ui = True
     bpy.ops.view3d.view_all()

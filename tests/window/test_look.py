@@ -1,63 +1,33 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads pictures of the program's window: is what the add-on shows really on the screen, without any switch?
-
-FMQM_SCREENSHOT names a command `... SCRIPT OUT_PREFIX [arguments of Blender]` that opens Blender's window, runs the
-script with shot(name) and done() in builtins, and saves OUT_PREFIX-name.png.
-"""
+"""Reads pictures of the program's window: is what the add-on shows really on the screen, without any switch?"""
 
 from __future__ import annotations
 
 import json
-import os
-import shlex
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tests.house.test_extension import ROOT, package  # noqa: F401  the fixture
+from tests.house.test_extension import package  # noqa: F401  the fixture
+from tests.window.pictures import Pixels, cut, pictures_in, run_in_window
 
 pytestmark = pytest.mark.program
-Pixels = np.ndarray
-SCRIPT = Path(__file__).with_name("look_script.py")
 REPORT: dict[str, object] = {}  # what the script wrote down
 
 
 @pytest.fixture(scope="module")
 def pictures(tmp_path_factory: pytest.TempPathFactory, package: Path) -> dict[str, Pixels]:  # noqa: F811
     """(H, W, 3) float pictures in [0, 1] of the 3D view and, under "panel", of its sidebar."""
-    command = os.environ.get("FMQM_SCREENSHOT")
-    if not command:
-        pytest.skip("FMQM_SCREENSHOT does not name a command that takes pictures of Blender's window")
-    image = pytest.importorskip("PIL.Image")
     out = tmp_path_factory.mktemp("pictures")
-    done = subprocess.run(
-        [*shlex.split(command), str(SCRIPT), str(out / "view"), "--enable-event-simulate"],
-        env={**os.environ, "FMQM_ZIP": str(package), "FMQM_OUT": str(out), "FMQM_ROOT": str(ROOT)},
-        capture_output=True,
-        text=True,
-        timeout=400,
-        check=False,
-    )
-    error = out / "error.txt"
-    assert not error.exists(), error.read_text()
-    assert "Traceback" not in done.stdout + done.stderr, done.stdout + done.stderr
+    run_in_window("look_script.py", package, out, "--enable-event-simulate")
     regions = json.loads((out / "regions.json").read_text())
-    print(f"pictures are in {out}")
     REPORT.update(json.loads((out / "report.json").read_text()))
     found = {}
-    for path in sorted(out.glob("view-*.png")):
-        whole = np.asarray(image.open(path).convert("RGB"), np.float64) / 255
-        found[path.stem.removeprefix("view-")] = cut(whole, regions["WINDOW"], regions["UI"][2])
+    for name, whole in pictures_in(out).items():
+        found[name] = cut(whole, regions["WINDOW"], regions["UI"][2])
         found["panel"] = cut(whole, regions["UI"])
     return found
-
-
-def cut(picture: Pixels, region: list[int], less: int = 0) -> Pixels:
-    """A region of the window, whose rows count from below."""
-    x, y, width, height = region
-    return picture[picture.shape[0] - y - height : picture.shape[0] - y, x : x + width - less]
 
 
 def center(picture: Pixels) -> Pixels:
