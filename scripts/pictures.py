@@ -3,9 +3,9 @@
 
     python scripts/pictures.py [--out out/pictures] [--docs docs]
 
-demo.png is the demo's own. report.png needs Chromium. look.png, units.png and slice.png are taken from Blender's
-window by the command that the variable FMQM_SCREENSHOT names: `... SCRIPT OUT_PREFIX` opens the window, runs the
-script with shot(name) and done() in builtins, and saves OUT_PREFIX-name.png. What is missing is said, and skipped.
+demo.png is the demo's own. report.png needs Chromium. The others are taken from Blender's window by the command that
+the variable FMQM_SCREENSHOT names: `... SCRIPT OUT_PREFIX` opens the window, runs the script with shot(name) and
+done() in builtins, and saves OUT_PREFIX-name.png. What is missing is said, and skipped.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ from PIL import Image
 LEVELS = ((0.4, 1024), (0.15, 512), (0.06, 256))  # of the report: triangles that are kept, side of the texture
 REPORT_SIZE = (1040, 1544)  # of the page; the picture is smaller
 WIDTH = 880  # of the picture
-WINDOW_PICTURES = ("look", "units", "slice")
+WINDOW_PICTURES = {"look": ("look", "units", "slice"), "compare": ("loupe",)}  # by what pictures_window.py does
+FLIP, FLIP_SIDE, HEADER = "flip.webp", 640, 52  # pixels; of the header above the view
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 
@@ -85,26 +86,49 @@ def picture_of_report(out: Path, reference: Path) -> Path | None:
 def pictures_of_window(out: Path, *urns: Path) -> list[Path]:
     command = os.environ.get("FMQM_SCREENSHOT")
     if not command:
-        names = ", ".join(f"{name}.png" for name in WINDOW_PICTURES)
-        print(f"pictures.py: {names} are left as they are: FMQM_SCREENSHOT names no command that takes pictures")
+        names = ", ".join(f"{name}.png" for names in WINDOW_PICTURES.values() for name in names)
+        print(f"pictures.py: {names} and {FLIP} are left as they are: FMQM_SCREENSHOT names no command for pictures")
         return []
     rectangle = out / "rectangle.json"
-    rectangle.unlink(missing_ok=True)
-    subprocess.run(
-        [*shlex.split(command), str(Path(__file__).with_name("pictures_window.py")), str(out / "window")],
-        env={**os.environ, "FMQM_ROOT": str(demo.ROOT), "FMQM_URNS": json.dumps([str(urn) for urn in urns]),
-             "FMQM_RECTANGLE": str(rectangle)},
-        check=False,
-    )  # fmt: skip
-    if not rectangle.is_file():
-        sys.exit("pictures.py: Blender's window could not be opened")
-    x, y, width, height = json.loads(rectangle.read_text())
     found = []
-    for name in WINDOW_PICTURES:
-        whole = Image.open(out / f"window-{name}.png").convert("RGB")
-        found.append(out / f"{name}.png")
-        whole.crop((x, whole.height - y - height, x + width, whole.height - y)).save(found[-1])
+    for part, names in WINDOW_PICTURES.items():
+        rectangle.unlink(missing_ok=True)
+        subprocess.run(
+            [*shlex.split(command), str(Path(__file__).with_name("pictures_window.py")), str(out / "window")],
+            env={**os.environ, "FMQM_ROOT": str(demo.ROOT), "FMQM_URNS": json.dumps([str(urn) for urn in urns]),
+                 "FMQM_RECTANGLE": str(rectangle), "FMQM_SET": part},
+            check=False,
+        )  # fmt: skip
+        if not rectangle.is_file():
+            sys.exit("pictures.py: Blender's window could not be opened")
+        area = json.loads(rectangle.read_text())
+        for name in names:
+            found.append(out / f"{name}.png")
+            cut(out / f"window-{name}.png", area).save(found[-1])
+    found.append(animate(out, area))
     return found
+
+
+def cut(picture: Path, area: list[int]) -> Image.Image:
+    """A part of the window, whose rows count from below."""
+    whole = Image.open(picture).convert("RGB")
+    x, y, width, height = area
+    return whole.crop((x, whole.height - y - height, x + width, whole.height - y))
+
+
+def animate(out: Path, area: list[int]) -> Path:
+    """The Original and the LOD in turn, then the wipe from one side to the other."""
+    x, y, width, height = area
+    side = height - HEADER
+    middle = [x + (width - side) // 2, y, side, side]
+    wipes = sorted(out.glob("window-wipe-*.png"), key=lambda path: int(path.stem.rpartition("-")[2]))
+    original, lod = out / "window-flip-original.png", out / "window-flip-lod.png"
+    paths = [original, lod, original, lod, *wipes]
+    frames = [cut(path, middle).resize((FLIP_SIDE, FLIP_SIDE), Image.Resampling.LANCZOS) for path in paths]
+    milliseconds = [900] * 4 + [120] * len(wipes)
+    target = out / FLIP
+    frames[0].save(target, save_all=True, append_images=frames[1:], duration=milliseconds, loop=0, quality=80, method=6)
+    return target
 
 
 def main() -> None:
@@ -118,7 +142,10 @@ def main() -> None:
     shutil.copy(out / "demo.png", args.docs / "demo.png")
     report = picture_of_report(out, urns[0])
     for picture in (*([report] if report else []), *pictures_of_window(out, *urns)):
-        Image.open(picture).convert("RGB").save(args.docs / picture.name, optimize=True)
+        if picture.suffix == ".png":
+            Image.open(picture).convert("RGB").save(args.docs / picture.name, optimize=True)
+        else:
+            shutil.copy(picture, args.docs / picture.name)
     print(f"the pictures are in {args.docs}")
 
 

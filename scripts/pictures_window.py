@@ -19,6 +19,8 @@ from window_steps import play, view
 
 DISTANCE = 1.5  # between the two urns
 SCALE = 0.8  # of the interface, so that the sidebar shows what is below the results
+REST = 1  # seconds from the drawing to the picture
+WIPES = tuple(0.5 + 0.025 * step for step in range(-9, 10, 2))  # of the view's width, from left to right
 UNIT = 9000  # how many of the metric's color units into the list: an edge in the ornament
 
 
@@ -74,14 +76,48 @@ def slice_() -> None:
     bpy.ops.fmqm.slice()
 
 
-STEPS: list[tuple[Callable[[], object], str]] = [
-    (start, ""), (measure, ""), (look, "look"), (units, "units"), (slice_, "slice"),
-]  # fmt: skip
+def loupe() -> None:
+    bpy.ops.fmqm.worst_step(step=1)
+    bpy.ops.fmqm.loupe("INVOKE_DEFAULT")
+
+
+def flip() -> None:
+    bpy.ops.fmqm.loupe("INVOKE_DEFAULT")  # closes it
+    look_from(0, (0, 0, 0.6), 1.45)
+    area = view()[1]
+    area.spaces.active.show_region_ui = area.spaces.active.show_region_toolbar = False
+    bpy.ops.fmqm.flip("INVOKE_DEFAULT")
+
+
+def turn() -> None:
+    bpy.ops.fmqm.flip("INVOKE_DEFAULT")
+
+
+def wipe_to(share: float) -> Callable[[], None]:
+    def wipe() -> None:
+        from fmqm_addon.ui.view import flip
+
+        flip.wipe_to(share)
+
+    return wipe
+
+
+SETS: dict[str, list[tuple[Callable[[], object], str]]] = {
+    "look": [(look, "look"), (units, "units"), (slice_, "slice")],
+    "compare": [
+        *((loupe, "loupe"), (flip, "flip-lod"), (turn, "flip-original")),
+        *((wipe_to(share), f"wipe-{number}") for number, share in enumerate(WIPES)),
+    ],
+}
 
 
 def measuring() -> bool:
-    session = sys.modules.get("fmqm_addon.ui.session")
-    return session is not None and session.job is not None
+    """Whether there is work that has its own timer."""
+    modules = [sys.modules.get(f"fmqm_addon.ui.{name}") for name in ("session", "view.loupe", "view.flip")]
+    if None in modules:
+        return False
+    session, *tools = modules
+    return session.job is not None or any(tool.shown is not None and tool.shown.work is not None for tool in tools)
 
 
-play(STEPS, measuring, print)
+play([(start, ""), (measure, ""), *SETS[os.environ["FMQM_SET"]]], measuring, print, rest=REST)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from . import gizmos, live, operators, panels, preferences, properties, stale
+from . import gizmos, keys, live, operators, panels, preferences, properties, stale
 from .operators import measure
 from .panels import swatches
 from .properties import scene
@@ -29,10 +29,12 @@ def register() -> None:
     stale.register()
     updates.register()
     live_corner.register()
+    keys.register()
 
 
 def unregister() -> None:
     """The exact mirror of register."""
+    keys.unregister()
     live_corner.unregister()
     live.turn_off()
     updates.unregister()

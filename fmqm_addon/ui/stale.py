@@ -19,7 +19,7 @@ from ..comparison.alignment import location_counts
 from . import session
 from .properties.items import item_target, kept
 from .properties.rows import row_targets
-from .view.shown import forget_removed
+from .view.shown import forget_removed, put_away
 
 WATCHED = tuple(
     getattr(bpy.types, name)
@@ -115,6 +115,7 @@ def _on_undo(*_: object) -> None:
 @_kept
 def _before_load(*_: object) -> None:
     _stop_job()
+    put_away()
 
 
 @_kept

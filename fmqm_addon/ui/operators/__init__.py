@@ -1,7 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The sidebar's buttons."""
 
-from . import chain, decimate, inputs, live, measure, pick, presets, probe, report, results, save, screen_sizes, view
+from . import (
+    chain,
+    decimate,
+    flip,
+    inputs,
+    live,
+    loupe,
+    measure,
+    pick,
+    presets,
+    probe,
+    report,
+    results,
+    save,
+    screen_sizes,
+    view,
+)
 
 CLASSES: tuple[type, ...] = (
     *inputs.CLASSES,
@@ -14,6 +30,8 @@ CLASSES: tuple[type, ...] = (
     *view.CLASSES,
     *pick.CLASSES,
     *probe.CLASSES,
+    *loupe.CLASSES,
+    *flip.CLASSES,
     *decimate.CLASSES,
     *chain.CLASSES,
     *screen_sizes.CLASSES,

@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 
 from ...metric.errors import FMQMError
-from ..view.result import measured_row
+from ..view.result import measured_row, why_not
 
 
 def allowed(cls: type, why: str) -> bool:
@@ -36,3 +36,9 @@ def no_viewport(context: bpy.types.Context) -> str:
     if context.area is None or context.area.type != "VIEW_3D":
         return "Needs a 3D viewport"
     return no_samples(context)
+
+
+def cannot_compare(context: bpy.types.Context) -> str:
+    """Why a view cannot show the two of the chosen row as they are now; "" where it can."""
+    reason = no_viewport(context) or why_not(context.scene)
+    return reason[:1].upper() + reason[1:]

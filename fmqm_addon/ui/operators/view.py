@@ -10,7 +10,7 @@ from bpy.props import IntProperty
 
 from ...metric.errors import FMQMError
 from ..view import heat, kept, shown, units, worst
-from ..view.result import look_of, measured_row
+from ..view.result import look_of
 from .polls import allowed, no_samples
 
 
@@ -68,12 +68,7 @@ class FMQM_OT_worst_step(ShowOperator, bpy.types.Operator):  # noqa: N801
         return f"Frame the {which} of the lowest patches and show only it"
 
     def act(self, context: bpy.types.Context) -> None:
-        look = look_of(context.scene)
-        uid, _, measured = measured_row(context.scene)
-        worst.fill_worst(look, measured.comparison.result, uid)
-        if look.focused and look.worst:  # the first press shows the worst one
-            worst.choose_worst(look, (look.worst_index + self.step) % len(look.worst))
-        worst.focus_patch(context.scene, context.area)
+        worst.step_worst(context.scene, context.area, self.step)
 
 
 class FMQM_OT_worst_all(bpy.types.Operator):  # noqa: N801

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The sidebar's panels. They show what is stored and compute nothing."""
 
-from . import chain, decimate, details, main, parts, results, settings, sizes, trust, view
+from . import chain, compare, decimate, details, main, parts, results, settings, sizes, trust, view
 
 # Panels before their sub-panels.
 CLASSES: tuple[type, ...] = (
@@ -13,6 +13,7 @@ CLASSES: tuple[type, ...] = (
     *parts.CLASSES,
     *trust.CLASSES,
     *view.CLASSES,
+    *compare.CLASSES,
     *decimate.CLASSES,
     *chain.CLASSES,
 )

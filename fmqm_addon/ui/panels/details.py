@@ -36,7 +36,7 @@ class FMQM_PT_details(OfResult, bpy.types.Panel):  # noqa: N801
     bl_label = "Details"
     bl_description = "All numbers of the chosen result, and how far to trust it"
     bl_options: ClassVar = {"DEFAULT_CLOSED"}
-    bl_order = 4
+    bl_order = 5
 
     def draw(self, context: bpy.types.Context) -> None:
         row = active_row(context.scene)

@@ -56,6 +56,24 @@ def free_corner(ink: Ink) -> tuple[float, float]:
     return left + ink.px(_MARGIN), bottom + ink.px(_MARGIN)
 
 
+def free_part(area: bpy.types.Area, window: bpy.types.Region) -> tuple[float, float, float, float]:
+    """Left, bottom, right and top of what no toolbar, header or sidebar covers of a view, in pixels of its region."""
+    left, bottom, right, top = 0, 0, window.width, window.height
+    for region in area.regions:
+        if region.width <= 1 or region.height <= 1 or region == window or region.type == "HUD":
+            continue
+        x, y = region.x - window.x, region.y - window.y
+        if region.alignment == "LEFT":
+            left = max(left, x + region.width)
+        elif region.alignment == "RIGHT":
+            right = min(right, x)
+        elif region.alignment == "BOTTOM":
+            bottom = max(bottom, y + region.height)
+        elif region.alignment == "TOP":
+            top = min(top, y)
+    return left, bottom, right, top
+
+
 def box(x: float, y: float, width: float, height: float, color: Color) -> None:
     corners = [(x, y), (x + width, y), (x, y + height), (x + width, y + height)]
     draw_shape("TRI_STRIP", corners, [color] * 4)

@@ -42,6 +42,18 @@ def showable(scene: bpy.types.Scene) -> FMQMRow | None:
     return None if row is None or row.uid in session.stale or session.get(row.uid) is None else row
 
 
+def why_not(scene: bpy.types.Scene) -> str:
+    """Why there is nothing to look at, and what to do; "" where there is."""
+    row = active_row(scene)
+    if row is None:
+        return "There is no result yet; press Measure Quality first"
+    if row.error:
+        return f"{row.name} could not be measured"
+    if session.get(row.uid) is None:
+        return f"{row.name}: {AGAIN}"
+    return session.stale.get(row.uid, "")
+
+
 def world_matrix(measured: session.Measured, place: str) -> Floats:
     """(4, 4) from the metric's frame to where a row's compared object (COMPARED) or its reference stands."""
     frame = measured.reference.frame

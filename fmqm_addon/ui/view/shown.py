@@ -9,7 +9,7 @@ from ...blender.display import scene_objects, viewport
 from ...comparison.judge import Judge
 from .. import session
 from ..properties.rows import active_row
-from . import heat, overlay, shells, slice_plane, worst
+from . import flip, heat, loupe, overlay, shells, slice_plane, worst
 from .result import look_of, measured_row
 from .units import follow_unit
 
@@ -62,6 +62,7 @@ def show_heat_map(scene: bpy.types.Scene) -> None:
 
 def clear() -> int:
     """Takes all of it away, and the views back to where they were; how many data-blocks there were."""
+    put_away()
     overlay.figure = None
     for scene in bpy.data.scenes:
         look = look_of(scene)
@@ -73,6 +74,12 @@ def clear() -> int:
     count = scene_objects.clear()
     viewport.redraw()
     return count
+
+
+def put_away() -> None:
+    """Ends the tools that draw over a view."""
+    loupe.close()
+    flip.close()
 
 
 def forget_removed() -> None:

@@ -10,7 +10,7 @@ import bpy
 
 from ...metric.errors import FMQMError
 from ..properties import view as properties
-from . import heat, overlay, shells, shown, slice_plane, worst
+from . import flip, heat, loupe, overlay, shells, shown, slice_plane, worst
 from .result import look_of
 
 _REST = 0.12  # seconds after which a slice that was moved is drawn finely again
@@ -68,6 +68,8 @@ def _watch() -> None:
     for kind, build_all in _TIMERS.items():
         if not kind.is_current(scene) and not bpy.app.timers.is_registered(build_all):
             bpy.app.timers.register(build_all, first_interval=0)
+    loupe.watch()
+    flip.watch()
 
 
 _TIMERS = {heat: heat.build_all, shells: shells.refresh_all, slice_plane: slice_plane.refresh_all}

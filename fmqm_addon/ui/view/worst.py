@@ -81,6 +81,16 @@ def focus_patch(scene: bpy.types.Scene, area: bpy.types.Area | None) -> None:
     )
 
 
+def step_worst(scene: bpy.types.Scene, area: bpy.types.Area | None, step: int) -> None:
+    """Goes so far along the list, and round it; as focus_patch. The first step shows the worst one."""
+    look = look_of(scene)
+    uid, _, measured = measured_row(scene)
+    fill_worst(look, measured.comparison.result, uid)
+    if look.focused and look.worst:
+        choose_worst(look, (look.worst_index + step) % len(look.worst))
+    focus_patch(scene, area)
+
+
 def show_all_patches(scene: bpy.types.Scene) -> None:
     look_of(scene).focused = False
     heat.refresh(scene)
