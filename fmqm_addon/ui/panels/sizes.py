@@ -53,9 +53,8 @@ class FMQM_PT_sizes(Sidebar, bpy.types.Panel):  # noqa: N801
         if sizes.engine == "gltf":
             column.prop(sizes, "height_ratio")
         box = layout.box().column(align=True)
-        box.scale_y = 0.8
         for line in engine_text(context.scene).splitlines():
-            box.label(text=line, translate=False)
+            wrapped(box, context, line)
         layout.operator(FMQM_OT_copy_sizes.bl_idname, icon="COPYDOWN")
 
 
