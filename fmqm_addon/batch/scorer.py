@@ -198,7 +198,7 @@ class _Scorer:
                 self._options.report, stem, *surfaces, result, self._options.judge
             )
             findings["viewer"] = self._viewer(row, stem, answer)
-        if self._options.explain:
+        if self._options.explain or self._options.report:
             findings["where"] = where(answer.reference, result)
         if answer.attribution is not None:
             findings["attribution"] = answer.attribution.as_dict()

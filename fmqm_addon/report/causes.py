@@ -57,7 +57,7 @@ def causes(features: Mapping[str, float], facts: Facts) -> Iterator[str]:
 
 
 def _of_texture(features: Mapping[str, float], facts: Facts) -> Iterator[str]:
-    sides = [_largest_side(side) for side in (facts.reference, facts.distorted)]
+    sides = [largest_side(side) for side in (facts.reference, facts.distorted)]
     if sides[0] and sides[1] and sides[1] < _SMALLER * sides[0]:
         yield f"Its texture is smaller, {sides[1]} pixels a side instead of {sides[0]}; keep a larger one."
     elif facts.pair.get("same_images") and min(features["shape"], features["facing"]) >= _LOW:
@@ -66,7 +66,7 @@ def _of_texture(features: Mapping[str, float], facts: Facts) -> Iterator[str]:
         yield "Its texture is another one: blurred, compressed more, or baked anew; compare the images."
 
 
-def _largest_side(side: Mapping[str, Any]) -> int:
-    """Of the images that base colors come from, in pixels; 0 for none."""
+def largest_side(side: Mapping[str, Any]) -> int:
+    """Of the largest image of a mesh's facts that base colors come from, in pixels; 0 for none."""
     images = side.get("images") or ()
     return max((max(image["width"], image["height"]) for image in images if image["role"] == "base color"), default=0)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -84,14 +84,23 @@ def explain(record: Mapping[str, Any]) -> str:
     """
     if record["error"] is not None:
         return f"Not scored: {record['error']}."
-    return " ".join(part for part in (verdict(record), _place(record), _sureness(record, Facts(record))) if part)
+    return " ".join([*sentences(record), *_doubt(record)])
+
+
+def sentences(record: Mapping[str, Any]) -> list[str]:
+    """What explain() says of a scored pair, its warnings aside."""
+    found = [*_judgement(record), _place(record), *_sureness(record, Facts(record))]
+    return [sentence for sentence in found if sentence]
 
 
 def verdict(record: Mapping[str, Any]) -> str:
     """How much a scored pair differs, by what, and why, as far as that is known."""
+    return " ".join(sentence for sentence in _judgement(record) if sentence)
+
+
+def _judgement(record: Mapping[str, Any]) -> list[str]:
     facts = Facts(record)
-    parts = (_verdict(record, facts), _worse(record, facts), *causes(record["perceived"], facts))
-    return " ".join(part for part in parts if part)
+    return [_verdict(record, facts), _worse(record, facts), *causes(record["perceived"], facts)]
 
 
 def _verdict(record: Mapping[str, Any], facts: Facts) -> str:
@@ -154,18 +163,19 @@ def _place(record: Mapping[str, Any]) -> str:
     return f"A tenth of the surface has {share} of the loss, at the {places}."
 
 
-def _sureness(record: Mapping[str, Any], facts: Facts) -> str:
-    sentences = []
+def _sureness(record: Mapping[str, Any], facts: Facts) -> Iterator[str]:
     stderr = record["perceived"]["stderr"]
     if stderr is not None and 2 * stderr["score"] > PERCEIVED_NOISE:
-        sentences.append(f"Other random samples move perceived by about {2 * stderr['score']:.2g}.")
+        yield f"Other random samples move perceived by about {2 * stderr['score']:.2g}."
     if record["patches"] >= FEW_PATCHES and (facts.pair.get("covered") or 1) < LEAST_COVERED:
-        sentences.append("Much of the original was not looked at.")
+        yield "Much of the original was not looked at."
+
+
+def _doubt(record: Mapping[str, Any]) -> Iterator[str]:
     if record["warnings"]:
         others = len(record["warnings"]) - 1
         more = f" (and {others} more {'warning' if others == 1 else 'warnings'})" if others else ""
-        sentences.append(f"Before believing it: {record['warnings'][0]}{more}.")
-    return " ".join(sentences)
+        yield f"Before believing it: {record['warnings'][0]}{more}."
 
 
 def _short(number: float) -> str:

@@ -13,6 +13,7 @@ from ..comparison.impairment import IMPAIRMENTS
 from ..comparison.judge import Judge
 from ..metric.perceived import Perceived
 from .explain import explain
+from .html.pictures import FRONT_VIEW, KINDS, LOSS, MESHES
 from .html.viewer.files import is_viewer
 from .records import RECORD_KEYS, SHOWN, STAGES
 from .trust_table import GROUPS, trust_lines
@@ -145,24 +146,45 @@ def _is_picture(value: object) -> bool:
     return isinstance(value, str) and bool(_PICTURE.fullmatch(value))
 
 
+def _are_pictures(value: object, kinds: Sequence[str]) -> bool:
+    return isinstance(value, Mapping) and all(_is_picture(value.get(kind)) for kind in kinds)
+
+
+def _is_view(value: object) -> bool:
+    return (
+        isinstance(value, Mapping)
+        and _are_pictures(value, KINDS)
+        and value.get("name") in (LOSS, FRONT_VIEW)
+        and _is_list(value.get("size"), _is_count, 2)
+    )
+
+
 def _is_worst(value: object) -> bool:
     return (
         isinstance(value, Mapping)
-        and all(_is_picture(value.get(name)) for name in ("reference", "distorted"))
+        and _are_pictures(value, MESHES)
         and all(_is_share(value.get(name)) for name in ("FMQM", "perceived", "value"))
-        and _is_text(value.get("blame"))
-        and (value.get("at") is None or _is_list(value["at"], _is_number, 2))
+        and all(_is_text(value.get(name)) for name in ("blame", "place"))
+        and _is_optional_text(value.get("object"))
+        and _is_list(value.get("at"), lambda at: at is None or _is_list(at, _is_number, 2))
     )
 
 
 def _is_pictures(value: object) -> bool:
     return value is None or (
         isinstance(value, Mapping)
-        and all(_is_picture(value.get(name)) for name in ("reference", "distorted", "heat"))
-        and all(_is_list(value.get(name), _is_count, 2) for name in ("size", "triangles", "texture_bytes"))
+        and _is_list(value.get("views"), _is_view)
+        and len(value["views"]) > 0
+        and _are_pictures(value.get("thumbnails"), KINDS)
+        and _is_list(value.get("range"), _is_share, 2)
+        and value["range"][0] < value["range"][1]
+        and _is_list(value.get("histogram"), _is_count)
+        and len(value["histogram"]) > 0
+        and all(_is_list(value.get(name), _is_count, 2) for name in ("triangles", "texture_bytes"))
         and value.get("judge") in tuple(Judge)
         and isinstance(value.get("has_gaps"), bool)
         and _is_list(value.get("worst"), _is_worst)
+        and all(len(worst["at"]) == len(value["views"]) for worst in value["worst"])
     )
 
 

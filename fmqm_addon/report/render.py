@@ -7,7 +7,7 @@ games show meshes. No renderer and no graphics card take part.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 
 from ..comparison.normals import corner_normals
 from ..metric.errors import FMQMError
-from ..metric.evaluation import Result
-from ..metric.geometry import Floats, Ints, closest_on_triangles, dot
+from ..metric.geometry import Floats, Ints, cross, dot
 from ..metric.stepper import Progress, Work, as_part, finish
-from ..metric.surface import Surface, triangle_normals
+from ..metric.surface import Surface
 from .visual.axes import plane_axes
-from .visual.colormap import score_colors
 
 Pixels = NDArray[np.uint8]
+# (N,) triangles, (N, 3) points on them and where these are on each, barycentric, to (N, 3) encoded colors in [0, 1].
+Paint = Callable[[Ints, Floats, Floats], Floats]
 
 BACKGROUND = (236, 237, 239)  # light grey: stands on white pages and on dark ones
 
@@ -36,7 +36,8 @@ AMBIENT, SCORE_AMBIENT = 0.5, 0.65  # shade of a face edge-on; colors that mean 
 LIGHT = (-0.45, 0.55, 1.0)  # direction to the headlight: right, up, towards the camera
 CONTRAST = 0.16  # pixels that differ this much from a neighbor get more rays
 MORE_RAYS = np.array([(-1, -3), (3, -1), (1, 3), (-3, 1)]) / 8  # a turned square: no two in a row or column
-BATCH = 1 << 13  # rays of a step
+BATCH = 1 << 14  # rays at once: few enough for a processor's cache
+TILE = 8  # pixels; width and height of what is left out where nothing can be seen
 HIDDEN_BEHIND = 0.01  # of the frame: what lies this much deeper than what is seen is hidden
 
 
@@ -112,8 +113,13 @@ class Camera:
         """(N, 3) unit directions from the eye; x from -1 (left) to 1, y from -1 (bottom) to 1."""
         local = np.stack([x * self.half[0], y * self.half[1], np.ones(len(x))], axis=1)
         directions: Floats = local @ self.axes
-        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        directions /= np.sqrt(dot(directions, directions))[:, None]
         return directions
+
+
+def direction_towards(azimuth: float, elevation: float) -> Floats:
+    """(3,) unit, from what Camera.framing sees to where it stands."""
+    return -_view_axes(azimuth, elevation)[2]
 
 
 def _view_axes(azimuth: float, elevation: float) -> Floats:
@@ -123,9 +129,9 @@ def _view_axes(azimuth: float, elevation: float) -> Floats:
     return np.array([right, np.cross(right, forward), forward])
 
 
-def natural_aspect(*surfaces: Surface) -> float:
-    """Height by width of the surfaces as the usual camera sees them, within ASPECTS."""
-    points = np.concatenate([surface.vertices for surface in surfaces]) @ _view_axes(AZIMUTH, ELEVATION)[:2].T
+def natural_aspect(*surfaces: Surface, azimuth: float = AZIMUTH, elevation: float = ELEVATION) -> float:
+    """Height by width of the surfaces as a camera sees them that is framing() them, within ASPECTS."""
+    points = np.concatenate([surface.vertices for surface in surfaces]) @ _view_axes(azimuth, elevation)[:2].T
     width, height = np.maximum(points.max(axis=0) - points.min(axis=0), 1e-9)
     return float(np.clip(height / width, *ASPECTS))
 
@@ -134,80 +140,82 @@ def render(
     surface: Surface,
     camera: Camera,
     size: tuple[int, int],
-    face_color: Floats | None = None,
-    hits: Ints | None = None,
+    paint: Paint | None = None,
     normals: Floats | None = None,
 ) -> Pixels:
     """A surface as the camera sees it, from either side of its faces, on BACKGROUND.
 
     Args:
         size: width and height in pixels.
-        face_color: (T, 3) encoded colors in [0, 1] to show in place of the surface's own.
-        hits: what pixel_hits() says of the same surface, camera and size, to save casting them again.
-        normals: what corner_normals() says of the surface, to save smoothing them again.
+        paint: colors that mean numbers, to show in place of the surface's own.
+        normals: what corner_normals() says of the surface, to save smoothing them again; None: smoothed where seen.
 
     Returns:
         (height, width, 3) uint8. One ray a pixel, and more where neighbors differ.
     """
-    return finish(rendering(surface, camera, size, face_color, hits, normals))
+    return render_all(surface, camera, size, (paint,), normals)[0]
+
+
+def render_all(
+    surface: Surface,
+    camera: Camera,
+    size: tuple[int, int],
+    paints: Sequence[Paint | None],
+    normals: Floats | None = None,
+) -> list[Pixels]:
+    """As render(), once for each of the paints; the rays are cast once for all."""
+    return finish(rendering(surface, camera, size, paints, normals))
 
 
 def rendering(
     surface: Surface,
     camera: Camera,
     size: tuple[int, int],
-    face_color: Floats | None = None,
-    hits: Ints | None = None,
+    paints: Sequence[Paint | None],
     normals: Floats | None = None,
-) -> Work[Pixels]:
-    """render() in steps of some milliseconds; normals that are not given are smoothed where they are seen."""
+) -> Work[list[Pixels]]:
+    """render_all() in steps of some milliseconds."""
     columns, rows = _pixel_centers(size)
-    casting = _casting(surface, camera, size, columns, rows, normals, face_color, hits)
-    image = yield from as_part(casting, 0.0, 0.6)
-    rough = np.flatnonzero(_differs(image.reshape(size[1], size[0], 3)))
+    images = [np.full((size[0] * size[1], 3), np.array(BACKGROUND) / 255) for _ in paints]
+    near = _near_silhouette(surface, camera, size)
+    casting = _casting(surface, camera, size, columns[near], rows[near], paints, normals)
+    for image, colors in zip(images, (yield from as_part(casting, 0.0, 0.6)), strict=True):
+        image[near] = colors
+    rough = np.flatnonzero(np.any([_differs(image.reshape(size[1], size[0], 3)) for image in images], axis=0))
     across, down = MORE_RAYS.T
     columns, rows = (columns[rough, None] + across).ravel(), (rows[rough, None] + down).ravel()
-    fine = yield from as_part(_casting(surface, camera, size, columns, rows, normals, face_color), 0.6, 0.4)
-    image[rough] = fine.reshape(len(rough), len(MORE_RAYS), 3).mean(axis=1)
-    pixels: Pixels = (image.reshape(size[1], size[0], 3) * 255 + 0.5).astype(np.uint8)
-    return pixels
+    casting = _casting(surface, camera, size, columns, rows, paints, normals)
+    for image, colors in zip(images, (yield from as_part(casting, 0.6, 0.4)), strict=True):
+        image[rough] = colors.reshape(len(rough), len(MORE_RAYS), 3).mean(axis=1)
+    return [(image.reshape(size[1], size[0], 3) * 255 + 0.5).astype(np.uint8) for image in images]
 
 
-def pixel_hits(surface: Surface, camera: Camera, size: tuple[int, int]) -> Ints:
-    """(height * width,) the triangle behind the center of each pixel, row after row; -1 for none."""
-    return finish(hitting_pixels(surface, camera, size))
-
-
-def hitting_pixels(surface: Surface, camera: Camera, size: tuple[int, int]) -> Work[Ints]:
-    """pixel_hits() in steps of some milliseconds."""
-    columns, rows = _pixel_centers(size)
-    hits = np.empty(len(columns), np.int64)
-    for here in _batches(len(hits)):
-        hits[here] = _first_hits(surface, camera, _directions(camera, size, columns[here], rows[here]))
-        yield Progress("", here.stop / len(hits))
-    return hits
+def _near_silhouette(surface: Surface, camera: Camera, size: tuple[int, int]) -> Ints:
+    """The pixels, row after row, in tiles that triangles touch with their boxes; no other can show any of them."""
+    local = (surface.vertices - camera.eye) @ camera.axes.T
+    if local[:, 2].min() <= 0:  # what is beside the eye may be seen anywhere
+        return np.arange(size[0] * size[1])
+    tiles = [-(-side // TILE) for side in size]
+    shares = [(1 + sign * local[:, k] / local[:, 2] / camera.half[k]) / 2 for k, sign in ((0, 1), (1, -1))]
+    places = [
+        np.clip(share * side / TILE, -1, count).astype(np.int64)
+        for share, side, count in zip(shares, size, tiles, strict=True)
+    ]
+    corners = [place[surface.triangles] for place in places]
+    (left, top), (right, bottom) = ([of(place, axis=1).clip(0) for place in corners] for of in (np.min, np.max))
+    # Each box is counted at its corners; sums along both axes count it everywhere within.
+    width = tiles[0] + 2
+    counts = np.zeros((tiles[1] + 2) * width, np.int64)
+    for row, column, sign in ((top, left, 1), (top, right + 1, -1), (bottom + 1, left, -1), (bottom + 1, right + 1, 1)):
+        counts += sign * np.bincount(row * width + column, minlength=len(counts))
+    touched = counts.reshape(-1, width).cumsum(axis=0).cumsum(axis=1)[: tiles[1], : tiles[0]] > 0
+    return np.flatnonzero(touched.repeat(TILE, axis=0).repeat(TILE, axis=1)[: size[1], : size[0]])
 
 
 def _pixel_centers(size: tuple[int, int]) -> tuple[Floats, Floats]:
     """(N,) columns and rows, in pixels from the left and the top."""
     columns, rows = np.meshgrid(np.arange(size[0]) + 0.5, np.arange(size[1]) + 0.5)
     return columns.ravel(), rows.ravel()
-
-
-def _directions(camera: Camera, size: tuple[int, int], columns: Floats, rows: Floats) -> Floats:
-    """(N, 3) unit directions through places of the image, in pixels."""
-    return camera.directions(2 * columns / size[0] - 1, 1 - 2 * rows / size[1])
-
-
-def _batches(count: int) -> Iterator[slice]:
-    """So many rays, as many as are asked for at once: a query makes Python objects of them."""
-    for first in range(0, count, BATCH):
-        yield slice(first, min(first + BATCH, count))
-
-
-def _first_hits(surface: Surface, camera: Camera, directions: Floats) -> Ints:
-    """(N,) the first triangle on each ray from the camera, -1 for none."""
-    return surface.query.first_hit(camera.eye + camera.near * directions, directions)[0]
 
 
 def is_seen(surface: Surface, camera: Camera, point: Floats) -> bool:
@@ -224,59 +232,58 @@ def _casting(
     size: tuple[int, int],
     columns: Floats,
     rows: Floats,
+    paints: Sequence[Paint | None],
     normals: Floats | None,
-    face_color: Floats | None,
-    hits: Ints | None = None,
-) -> Work[Floats]:
-    """(N, 3) encoded colors in [0, 1] of rays through places of the image, in pixels. hits: as in render()."""
-    colors = np.empty((len(columns), 3))
-    for here in _batches(len(colors)):
-        directions = _directions(camera, size, columns[here], rows[here])
-        triangle = _first_hits(surface, camera, directions) if hits is None else hits[here]
-        colors[here] = _ray_colors(surface, camera, directions, triangle, normals, face_color)
-        yield Progress("", here.stop / len(colors))
-    return colors
+) -> Work[list[Floats]]:
+    """(N, 3) encoded colors in [0, 1], for each of the paints, of rays through places of the image, in pixels."""
+    images = [np.empty((len(columns), 3)) for _ in paints]
+    for first in range(0, len(columns), BATCH):
+        here = slice(first, first + BATCH)
+        directions = camera.directions(2 * columns[here] / size[0] - 1, 1 - 2 * rows[here] / size[1])
+        for image, colors in zip(images, _ray_colors(surface, camera, directions, paints, normals), strict=True):
+            image[here] = colors
+        yield Progress("", min(here.stop / len(columns), 1.0))
+    return images
 
 
 def _ray_colors(
-    surface: Surface,
-    camera: Camera,
-    directions: Floats,
-    triangle: Ints,
-    normals: Floats | None,
-    face_color: Floats | None,
-) -> Floats:
-    """(N, 3) encoded colors in [0, 1] of rays from the camera that end on the (N,) triangles; -1: BACKGROUND."""
-    colors = np.empty((len(directions), 3))
-    colors[:] = np.array(BACKGROUND) / 255
-    hit = np.flatnonzero(triangle >= 0)
+    surface: Surface, camera: Camera, directions: Floats, paints: Sequence[Paint | None], normals: Floats | None
+) -> Iterator[Floats]:
+    """(N, 3) encoded colors in [0, 1] of (N, 3) rays from the camera, once for each of the paints."""
+    triangle, _ = surface.query.first_hit(camera.eye + camera.near * directions, directions)
+    count, hit = len(triangle), np.flatnonzero(triangle >= 0)
     directions, triangle = directions[hit], triangle[hit]
-    a, b, c = (surface.vertices[surface.triangles[triangle, k]] for k in range(3))
-    flat = triangle_normals(surface.vertices, surface.triangles[triangle])
-    slope = dot(flat, directions)
-    distance = dot(a - camera.eye, flat) / np.where(np.abs(slope) < 1e-12, 1e-12, slope)
-    barycentric = closest_on_triangles(camera.eye + distance[:, None] * directions, a, b, c)[1]
-    smooth = np.einsum("nk,nkc->nc", barycentric, _normals_of(surface, triangle, normals))
+    # What is the same for all of a triangle's pixels is computed once.
+    seen = np.zeros(len(surface.triangles), bool)
+    seen[triangle] = True
+    shown = np.flatnonzero(seen)
+    row = (np.cumsum(seen) - 1)[triangle]
+    a, b, c = (surface.vertices[surface.triangles[shown, k]] - camera.eye for k in range(3))
+    ahead = dot(cross(a, b), c)  # above 0 where the order of the corners has the camera behind the face
+    side = np.where(ahead > 0, 1.0, -1.0)[:, None, None]
+    # A direction is in the cone of a triangle by its products with the three planes through the eye and an edge.
+    planes = side * np.stack([cross(b, c), cross(c, a), cross(a, b)], axis=1)
+    barycentric = np.maximum(np.einsum("nkc,nc->nk", planes[row], directions), 0)
+    total = barycentric.sum(axis=1, keepdims=True)
+    barycentric = np.where(total > 0, barycentric / np.where(total > 0, total, 1), 1 / 3)
     # Towards the camera, whichever side of the face that is; normals that stand on the other side than the order of
     # the corners say which side is meant.
-    smooth *= (-np.sign(slope) * np.where(dot(flat, smooth) < 0, -1, 1))[:, None]
+    own = corner_normals(surface, faces=shown) if normals is None else normals[shown]
+    meant = np.where(dot(own.sum(axis=1), cross(b - a, c - a)) < 0, 1.0, -1.0)[:, None, None]
+    smooth = np.einsum("nk,nkc->nc", barycentric, (side * meant * own)[row])
     light = np.array(LIGHT) * (1, 1, -1) @ camera.axes
-    length = np.linalg.norm(light) * np.maximum(np.linalg.norm(smooth, axis=1), np.finfo(np.float64).tiny)
-    lit = np.maximum(smooth @ light / length, 0)
-    if face_color is not None:
-        seen, ambient = face_color[triangle], SCORE_AMBIENT
-    else:
-        seen, ambient = surface.color_at(triangle, barycentric), AMBIENT
-    colors[hit] = np.clip(seen, 0, 1) * (ambient + (1 - ambient) * lit)[:, None]
-    return colors
-
-
-def _normals_of(surface: Surface, triangle: Ints, normals: Floats | None) -> Floats:
-    """(N, 3, 3) unit normals at the corners of (N,) triangles, out of those of all where these are there."""
-    if normals is not None:
-        return normals[triangle]
-    faces, which = np.unique(triangle, return_inverse=True)
-    return corner_normals(surface, faces=faces)[which]
+    length = np.linalg.norm(light) * np.sqrt(np.maximum(dot(smooth, smooth), np.finfo(np.float64).tiny))
+    lit = np.maximum(smooth @ light / length, 0)[:, None]
+    for paint in paints:
+        colors = np.full((count, 3), np.array(BACKGROUND) / 255)
+        if not len(hit):
+            pass
+        elif paint is None:
+            colors[hit] = np.clip(surface.color_at(triangle, barycentric), 0, 1) * (AMBIENT + (1 - AMBIENT) * lit)
+        else:
+            points = camera.eye + np.einsum("nk,nkc->nc", barycentric, np.stack([a, b, c], axis=1)[row])
+            colors[hit] = paint(triangle, points, barycentric) * (SCORE_AMBIENT + (1 - SCORE_AMBIENT) * lit)
+        yield colors
 
 
 def _differs(image: Floats) -> NDArray[np.bool_]:
@@ -289,41 +296,6 @@ def _differs(image: Floats) -> NDArray[np.bool_]:
     differs[1:] |= down
     differs[:-1] |= down
     return differs
-
-
-def score_by_face(result: Result, surface: Surface, column: str = "FMQM") -> Floats:
-    """(T,) mean score of the patches that cover each triangle of the reference; nan where none does.
-
-    A triangle that was cut for the patches has the area-weighted mean of its covered pieces.
-
-    Args:
-        surface: the reference of the result. column: as in Result.of_patches.
-    """
-    mesh = result.patch_mesh
-    total, patches = np.zeros(len(mesh.triangles)), np.zeros(len(mesh.triangles))
-    for patch, score in zip(result.patches, result.of_patches(column).tolist(), strict=True):
-        total[patch.faces] += score
-        patches[patch.faces] += 1
-    covered = patches > 0
-    area, parent = mesh.areas[covered], mesh.parent[covered]
-    count = len(surface.triangles)
-    weighted = np.bincount(parent, area * total[covered] / patches[covered], minlength=count)
-    covered_area = np.bincount(parent, area, minlength=count)
-    scores: Floats = np.full(count, np.nan)
-    np.divide(weighted, covered_area, out=scores, where=covered_area > 0)
-    return scores
-
-
-def three_views(
-    reference: Surface, distorted: Surface, face_scores: Floats, camera: Camera, size: tuple[int, int]
-) -> tuple[Pixels, Pixels, Pixels]:
-    """The reference, the distorted surface, and the reference colored by its (T,) face_scores; as render()."""
-    hits, normals = pixel_hits(reference, camera, size), corner_normals(reference)
-    return (
-        render(reference, camera, size, hits=hits, normals=normals),
-        render(distorted, camera, size),
-        render(reference, camera, size, score_colors(face_scores), hits, normals),
-    )
 
 
 def require_pillow() -> None:

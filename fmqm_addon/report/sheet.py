@@ -15,10 +15,13 @@ from ..metric.evaluation import Result
 from ..metric.geometry import Floats
 from ..metric.surface import Surface
 from .atomic_files import replaced
+from .heat import Heat, heat_of
 from .labels import shorten
 from .numbers import score_text
-from .render import BACKGROUND, Camera, natural_aspect, require_pillow, score_by_face, three_views
-from .visual.colormap import NO_PATCH, score_colors
+from .render import BACKGROUND, Camera, natural_aspect, render, render_all, require_pillow
+from .visual.colormap import score_colors
+from .visual.heat_map import round_ticks
+from .visual.layers import number_text
 from .words import LABELS, LOD, ORIGINAL
 
 if TYPE_CHECKING:
@@ -65,19 +68,21 @@ def compose(
     from PIL import Image, ImageDraw
 
     sheet = _Sheet(width, natural_aspect(reference, distorted))
-    faces = score_by_face(result, reference, judge.column)
+    heat = heat_of(reference, result, judge)
     camera = Camera.framing(reference, distorted, aspect=sheet.panel[1] / sheet.panel[0])
+    own, painted = render_all(reference, camera, sheet.panel, (None, heat.paint))
+    views = (own, render(distorted, camera, sheet.panel), painted)
     canvas = Image.new("RGB", (width, sheet.height), BACKGROUND)
-    for index, view in enumerate(three_views(reference, distorted, faces, camera, sheet.panel)):
+    for index, view in enumerate(views):
         canvas.paste(Image.fromarray(view), (sheet.left(index), sheet.top))
     draw = ImageDraw.Draw(canvas)
-    score = float(result.of_patches(judge.column).mean())
+    score = float(heat.values.mean())
     features = [f"{LABELS[name]} {score_text(result.of_patches(name).mean(), places=3)}" for name in judge.features]
     sheet.label(draw, 0, ORIGINAL, reference.name, f"{len(reference.triangles):,} triangles")
     sheet.label(draw, 1, LOD, distorted.name, f"{len(distorted.triangles):,} triangles")
     heading = f"{LABELS[judge.column]} {score_text(score)}"
     sheet.label(draw, 2, heading, "   ".join(features[:2]), "   ".join(features[2:]))
-    sheet.color_bar(draw, LABELS[judge.column], score, bool(np.isnan(faces).any()))
+    sheet.color_bar(draw, LABELS[judge.column], score, heat)
     return canvas
 
 
@@ -107,7 +112,7 @@ class _Sheet:
             y = self.top + self.panel[1] + self._px(14 + 24 * number)
             self._text(draw, (center, y), line, 17, FAINT_INK, "mm")
 
-    def color_bar(self, draw: ImageDraw, column: str, score: float, has_gaps: bool) -> None:
+    def color_bar(self, draw: ImageDraw, column: str, score: float, heat: Heat) -> None:
         """Scores and their colors, 1 at the top, with a mark at the whole score."""
         px = self._px
         left, right = self.left(3), self.left(3) + px(BAR_WIDTH)
@@ -115,17 +120,21 @@ class _Sheet:
         rows = np.arange(bottom - top + 1)
         for row, color in zip(rows.tolist(), score_colors(1 - rows / rows[-1]), strict=True):
             draw.line([(left, top + row), (right, top + row)], fill=_to_bytes(color))
-        for tenth in range(0, 11, 2):
-            y = round(bottom - (bottom - top) * tenth / 10)
+
+        def height(value: float) -> int:
+            return round(bottom - (bottom - top) * min(max((value - heat.low) / (heat.high - heat.low), 0), 1))
+
+        ticks = round_ticks(heat.low, heat.high)
+        text = number_text(ticks[1] - ticks[0])
+        for tick in ticks:
+            y = height(tick)
             draw.line([(right + px(3), y), (right + px(8), y)], fill=RULE, width=max(px(1), 1))
-            self._text(draw, (right + px(13), y), f"{tenth / 10:.1f}", 16, INK, "lm")
-        y = round(bottom - (bottom - top) * score)
+            self._text(draw, (right + px(13), y), text(tick), 16, INK, "lm")
+        y = height(score)
         draw.polygon([(left - px(2), y), (left - px(11), y - px(6)), (left - px(11), y + px(6))], fill=INK)
         self._text(draw, (left, top - px(24)), column, 16, INK, "lm")
-        if has_gaps:
-            y = bottom + px(24)
-            draw.rectangle([left, y - px(6), left + px(12), y + px(6)], fill=_to_bytes(np.array(NO_PATCH)))
-            self._text(draw, (left + px(18), y), "no patch", 14, FAINT_INK, "lm")
+        if heat.has_gaps:
+            self._text(draw, (left, bottom + px(24)), "pale: no patch", 14, FAINT_INK, "lm")
 
     def _px(self, length: float) -> int:
         """A length in a picture of the usual WIDTH, here."""

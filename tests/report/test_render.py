@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from fmqm_addon.blender.scene.bvh import BVHQuery
+from fmqm_addon.comparison.judge import Judge
 from fmqm_addon.comparison.normals import corner_normals
 from fmqm_addon.metric.colorspace import srgb_to_lab
 from fmqm_addon.metric.errors import FileError, FMQMError
@@ -20,8 +22,10 @@ from fmqm_addon.metric.surface import Frame, MeshArrays, Surface, prepare_surfac
 from fmqm_addon.metric.texture import Material, PlainColor, Texture
 from fmqm_addon.report import render as rendering
 from fmqm_addon.report import sheet
+from fmqm_addon.report.heat import FRONT as FRONT_SIDE
+from fmqm_addon.report.heat import heat_of, side_of_loss
 from fmqm_addon.report.labels import shorten
-from fmqm_addon.report.render import Camera, render, score_by_face
+from fmqm_addon.report.render import Camera, render
 from fmqm_addon.report.sheet import write_picture
 from fmqm_addon.report.visual.colormap import NO_PATCH, score_colors
 from tests.metric.meshes import cube, sphere, surface, texture
@@ -75,17 +79,18 @@ def test_colors_stand_where_the_texture_says() -> None:
     assert middle[1] > 100
 
 
-def test_steps_and_shared_hits_and_normals_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_steps_shared_rays_and_given_normals_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     ball = surface(sphere(), (texture(),))
     camera, size = Camera.close_up(np.zeros(3), Camera.framing(ball).axes, 1.5), (40, 30)
     whole = render(ball, camera, size)
-    hits, normals = rendering.pixel_hits(ball, camera, size), corner_normals(ball)
-    assert np.array_equal(render(ball, camera, size, None, hits, normals), whole)
+    assert np.array_equal(render(ball, camera, size, None, corner_normals(ball)), whole)
+    own, same = rendering.render_all(ball, camera, size, (None, None))
+    assert np.array_equal(own, whole) and np.array_equal(same, whole)
     monkeypatch.setattr(rendering, "BATCH", 97)
-    stepper = Stepper(rendering.rendering(ball, camera, size))
+    stepper = Stepper(rendering.rendering(ball, camera, size, (None,)))
     done = [stepper.progress.done for _ in iter(stepper.step, False)]
-    assert len(done) > 1200 // 97 and done == sorted(done) and done[-1] == 1
-    assert np.array_equal(stepper.result, whole)
+    assert len(done) > 5 and done == sorted(done) and done[-1] == 1
+    assert np.array_equal(stepper.result[0], whole)
 
 
 def test_both_sides_of_a_face_are_drawn() -> None:
@@ -112,42 +117,55 @@ def test_camera_holds_every_vertex_and_wastes_nothing() -> None:
     assert camera.axes[1, 2] > 0.9  # Z is up
 
 
-def test_faces_have_the_mean_of_their_patches_and_grey_without() -> None:
-    settings = Settings(samples=2000, patches=20, scored_patches=2)
-    reference, _, result = compared(12, settings)
-    scores = score_by_face(result, reference)
-    column = COLUMNS.index("FMQM")
-    for face in range(len(reference.triangles)):
-        covering = [result.patch_scores[k, column] for k, patch in enumerate(result.patches) if face in patch.faces]
-        assert scores[face] == pytest.approx(np.mean(covering) if covering else np.nan, nan_ok=True)
-    assert 0 < np.isnan(scores).sum() < len(scores)
-
-    image = render(reference, Camera.framing(reference, **FRONT), (60, 60), score_colors(scores))
-    assert hue(image[30, 30]) == pytest.approx(hue(np.array(NO_PATCH)), abs=0.03)  # centers are far outside
-    corner = reference.vertices[result.patches[0].center]
-    row, column_ = (4 if corner[2] > 0 else 55), (55 if corner[0] > 0 else 4)
-    wanted = score_colors(result.patch_scores[:1, column])[0]
-    assert hue(image[row, column_]) == pytest.approx(hue(wanted), abs=0.03)
+def test_what_is_left_out_around_the_silhouette_shows_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Against every pixel's own ray, for a shape that leaves much of the image free."""
+    each = surface(sphere(), (texture(),))
+    camera = Camera.framing(each, wall(1, each.frame, width=6.0))
+    drawn = render(each, camera, (90, 70))
+    assert (drawn == rendering.BACKGROUND).all(axis=2).mean() > 0.5
+    monkeypatch.setattr(rendering, "_near_silhouette", lambda *_: np.arange(90 * 70))
+    assert np.array_equal(render(each, camera, (90, 70)), drawn)
 
 
-def test_cut_triangles_have_the_mean_of_their_pieces() -> None:
-    reference, _, result = compared(1, FEW)
-    mesh = result.patch_mesh
-    assert mesh.was_split and len(reference.triangles) == 2
-    assert np.bincount(mesh.parent, mesh.areas) == pytest.approx([mesh.area / 2] * 2)
-    corners = mesh.vertices[mesh.triangles].mean(axis=1)  # each piece lies on the side of its parent's centroid
-    parents = reference.vertices[reference.triangles].mean(axis=1)
-    nearest = np.linalg.norm(corners[:, None] - parents, axis=2).argmin(axis=1)
-    assert (nearest == mesh.parent).all()
-    scores = score_by_face(result, reference)
-    pieces = np.zeros(len(mesh.triangles))
-    for face in range(len(pieces)):
-        pieces[face] = np.mean(
-            [s for p, s in zip(result.patches, result.patch_scores[:, 4], strict=True) if face in p.faces]
-        )
-    for parent in (0, 1):
-        here = mesh.parent == parent
-        assert scores[parent] == pytest.approx(np.average(pieces[here], weights=mesh.areas[here]))
+def test_places_have_the_color_of_the_nearest_patch_between_fitted_ends() -> None:
+    reference, _, result = compared(12, FEW)
+    heat = heat_of(reference, result, Judge.FMQM)
+    assert heat.high == 1 and 0 <= heat.low <= np.percentile(heat.values, 5) and not heat.has_gaps
+    image = render(reference, Camera.framing(reference, **FRONT), (60, 60), heat.paint)
+    camera = Camera.framing(reference, **FRONT)
+    for patch, center in enumerate(result.patch_centers):
+        x, y = camera.place_of(center)
+        wanted = score_colors((heat.values[patch : patch + 1] - heat.low) / (1 - heat.low))[0]
+        seen = image[min(int(60 * y), 59), min(int(60 * x), 59)]
+        if (seen != rendering.BACKGROUND).any() and 0.1 < x < 0.9 and 0.1 < y < 0.9:
+            assert hue(seen) == pytest.approx(hue(wanted), abs=0.2)
+
+
+def test_places_without_a_patch_are_their_own_color_dimmed() -> None:
+    reference, _, result = compared(12, Settings(samples=2000, patches=20, scored_patches=2))
+    heat = heat_of(reference, result, Judge.FMQM)
+    assert heat.has_gaps
+    camera = Camera.framing(reference, **FRONT)
+    own, image = (render(reference, camera, (60, 60), paint).astype(float) for paint in (None, heat.paint))
+    bare = image[30, 15:45]  # centers are far outside
+    assert (
+        np.abs(bare - rendering.BACKGROUND).max(axis=1) < np.abs(own[30, 15:45] - rendering.BACKGROUND).max(axis=1)
+    ).all()
+    assert np.ptp(bare, axis=1).max() < 0.5 * np.ptp(own[30, 15:45], axis=1).max()
+
+
+@pytest.mark.parametrize(("x", "azimuth"), [(1.0, 90.0), (-1.0, 270.0)])
+def test_the_camera_goes_to_the_side_of_the_loss(x: float, azimuth: float) -> None:
+    """Of a ball whose patches are bad on one side only."""
+    ball = surface(sphere(), (texture(),))
+    evaluation = Evaluation(ball, Settings(samples=2000, patches=60))
+    evaluation.prepare().run()
+    result = evaluation.compare(ball).run()
+    assert side_of_loss(ball, result, Judge.FMQM) == FRONT_SIDE  # nothing is lost
+    scores = result.patch_scores.copy()
+    scores[:, COLUMNS.index("FMQM")] = np.where(x * result.patch_centers[:, 0] > 0.2, 0.3, 1.0)
+    found, _ = side_of_loss(ball, replace(result, patch_scores=scores), Judge.FMQM)
+    assert np.cos(np.radians(found - azimuth)) > 0.6
 
 
 def test_score_colors_are_even_and_bad_is_bright() -> None:

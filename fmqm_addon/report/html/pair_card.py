@@ -1,79 +1,120 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A pair's section of the page: its score, words, pictures and features, and how far to trust it."""
+"""A pair's card: its scores, words and pictures, what is worst by name, and how far to trust it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from html import escape
 from typing import Any
-from urllib.parse import quote
-
-import numpy as np
 
 from ...comparison.judge import Judge
 from ..criteria import judge_of, shortfall
+from ..explain import sentences
 from ..numbers import score_text
 from ..parts_table import part_cells, worst_first
 from ..records import PERCEIVED, SHOWN, shown_score, value_of
 from ..trust_table import Report, trust_lines
-from ..visual.colormap import NO_PATCH, score_colors
-from .fragments import MEGABYTE, bar, css, text
+from ..words import LABELS, LOD, ORIGINAL
+from .first_screen import level_mark
+from .fragments import MEGABYTE, bar, folded, scrolled, text
+from .histogram import histogram_svg
+from .overview import Overview
 from .size_curve import size_panel
+from .stills import close_ups, views
 from .viewer.markup import viewer_markup
 
 Record = Mapping[str, Any]
 
+_NAMED = ("object", "material")  # kinds of parts whose names an artist knows
+_ALIKE = 0.01  # parts whose perceived differ by less than this are as good as each other
 
-def pair_card(number: int, record: Record, name: str) -> str:
-    """The section of a record.
+
+def pair_card(number: int, record: Record, overview: Overview) -> str:
+    """The card of a record.
 
     Args:
-        number: of the pair, from 1 on. name: short, for people.
+        number: of the pair, from 1 on.
     """
-    path, judge = record["distorted"], judge_of(record)
-    whole_path = "" if name == path else f'<p class="faint">{text(path)}</p>'
-    parts = [
-        f'<div class="title"><div><h3>{text(name)}</h3>{whole_path}</div>'
-        f'<p class="score"><span class="faint">{judge.column}</span> {shown_score(record, judge.column)}'
-        f"{_impairment(record)}</p></div>",
-        f'<p class="bad">Too low: {missed}.</p>' if (missed := shortfall(record)) else "",
-    ]
+    short, judge = overview.short(record), judge_of(record)
+    name, pictures = short["distorted"], record.get("pictures")
+    parts = [_head(number, record, name, short["reference"])]
+    if missed := shortfall(record):
+        parts.append(f'<p class="bad">Too low: {missed}.</p>')
     if record["error"]:
         parts.append(f'<p class="bad">Not scored: {text(record["error"])}</p>')
-    if record.get("explanation") and not record["error"]:
-        parts.append(f'<p class="words">{text(record["explanation"])}</p>')
-    if record["warnings"]:
-        items = "".join(f"<li>{text(warning)}</li>" for warning in record["warnings"])
+    else:
+        words = _rest(sentences(short), overview.common["words"])
+        parts.append(f'<p class="words">{text(" ".join(words))}</p>')
+    if warnings := _rest(record["warnings"], overview.common["warnings"]):
+        items = "".join(f"<li>{text(warning)}</li>" for warning in warnings)
         parts.append(f'<ul class="warnings" aria-label="Warnings">{items}</ul>')
-    if pictures := record.get("pictures"):
-        parts.append(_views(name, pictures))
-        parts.append(viewer_markup(record.get("viewer"), name))
+    parts.append(viewer_markup(record.get("viewer"), name))
+    if pictures:
+        parts.append(views(name, pictures))
+        parts.append(close_ups(pictures["worst"], judge))
     if record["FMQM"] is not None:
-        close_ups = _close_ups(pictures["worst"], Judge(pictures["judge"])) if pictures else ""
-        parts.append(
-            f'<div class="panels"><div><h4>FMQM and its features</h4>{_numbers(record, SHOWN)}'
-            f"{_attribution(record.get('attribution'))}"
-            f"<h4>Perceived and its features</h4>{_numbers(record, PERCEIVED)}</div>{close_ups}</div>"
-        )
+        parts.append(_panels(record, pictures, judge))
     if sizes := size_panel(record.get("screen_size")):
-        parts.append(f'<div class="curves">{sizes}</div>')
+        parts.append(f'<div class="curves sizes">{sizes}</div>')
     if record["parts"]:
         parts.append(_parts(record["parts"]))
-    if record["notes"]:
-        items = "".join(f"<li>{text(note)}</li>" for note in record["notes"])
-        parts.append(f"<details><summary>Notes</summary><ul>{items}</ul></details>")
+    if notes := _rest(record["notes"], overview.common["notes"]):
+        parts.append(folded("Notes", f"<ul>{''.join(f'<li>{text(note)}</li>' for note in notes)}</ul>"))
     if record.get("trust"):
         parts.append(_trust(record["trust"]))
-    return f'<article class="card" id="pair-{number}">{"".join(parts)}</article>\n'
+    return f'<article class="card pair" id="pair-{number}" aria-labelledby="name-{number}">{"".join(parts)}</article>\n'
 
 
-def _impairment(record: Record) -> str:
-    return f'<br><span class="faint">{escape(record["impairment"])}</span>' if record["impairment"] else ""
+def _rest(said: Iterable[str], common: Collection[str]) -> list[str]:
+    """What is not said for all pairs together."""
+    return [each for each in said if each not in common]
+
+
+def _head(number: int, record: Record, name: str, reference: str) -> str:
+    big = "".join(
+        f'<div><dt>{LABELS[column]}</dt><dd class="number">{shown_score(record, column)}</dd></div>'
+        for column in ("FMQM", "perceived")
+        if value_of(record, column) is not None
+    )
+    against = f'<p class="faint">against <span title="{escape(record["reference"])}">{text(reference)}</span></p>'
+    return (
+        f'<div class="title"><div><h3 id="name-{number}" tabindex="-1" title="{escape(record["distorted"])}">'
+        f'{text(name)}</h3>{against}<p class="words-level">{level_mark(record["impairment"])}</p></div>'
+        f'<dl class="scores-big">{big}</dl>'
+        '<button type="button" class="close" aria-label="Close" title="Close">×</button></div>'
+    )
+
+
+def _panels(record: Record, pictures: Record | None, judge: Judge) -> str:
+    """The features of both readings, the histogram of the patches, and what both meshes cost."""
+    blame = _attribution(record.get("attribution"))
+    panels = [
+        f"<section><h4>FMQM and its features</h4>{_numbers(record, SHOWN)}{blame}</section>",
+        f"<section><h4>Perceived and its features</h4>{_numbers(record, PERCEIVED)}</section>",
+    ]
+    if pictures:
+        mean, label = value_of(record, judge.column) or 0.0, LABELS[judge.column]
+        low, high = pictures["range"]
+        drawn = histogram_svg(pictures["histogram"], low, high, mean, label)
+        panels.append(f"<section><h4>{label} of the patches</h4>{drawn}{_costs(pictures)}</section>")
+    return f'<div class="panels">{"".join(panels)}</div>'
+
+
+def _costs(pictures: Record) -> str:
+    rows = "".join(
+        f'<tr><th scope="row">{side}</th><td class="number">{triangles:,}</td>'
+        f'<td class="number">{size / MEGABYTE:.1f}</td></tr>'
+        for side, triangles, size in zip((ORIGINAL, LOD), pictures["triangles"], pictures["texture_bytes"], strict=True)
+    )
+    return (
+        '<table class="costs"><thead><tr><td></td><th scope="col" class="number">Triangles</th>'
+        f'<th scope="col" class="number">Texture MB</th></tr></thead><tbody>{rows}</tbody></table>'
+    )
 
 
 def _numbers(record: Record, columns: Iterable[str]) -> str:
     rows = "".join(
-        f"<dt>{name.replace('_', ' ')}</dt><dd>{bar(value_of(record, name))}</dd>"
+        f"<dt>{LABELS[name]}</dt><dd>{bar(value_of(record, name))}</dd>"
         f'<dd class="number">{shown_score(record, name)}</dd>'
         for name in columns
     )
@@ -90,72 +131,36 @@ def _attribution(attribution: Record | None) -> str:
     )
 
 
-def _views(name: str, pictures: Record) -> str:
-    """The three pictures on one camera; the worst patches that can be seen there are marked on the last."""
-    marks = "".join(
-        f'<span class="mark" style="left:{100 * worst["at"][0]:.1f}%;top:{100 * worst["at"][1]:.1f}%">{rank}</span>'
-        for rank, worst in enumerate(pictures["worst"], 1)
-        if worst["at"] is not None
-    )
-    costs = [
-        f"{triangles:,} triangles, {size / MEGABYTE:.1f} MB of textures"
-        for triangles, size in zip(pictures["triangles"], pictures["texture_bytes"], strict=True)
-    ]
-    size, judge = tuple(pictures["size"]), Judge(pictures["judge"])
-    figures = (
-        (_image(pictures["reference"], f"Reference of {name}", size), "Reference", costs[0]),
-        (_image(pictures["distorted"], f"Distorted: {name}", size), "Distorted", costs[1]),
-        (_image(pictures["heat"], f"Reference colored by the {judge.column} of {name}", size) + marks, "Heat map", ""),
-    )
-    return '<div class="views">' + "".join(
-        f'<figure><div class="picture">{picture}</div><figcaption><strong>{title}</strong> {caption}'
-        f"{_legend(judge, pictures['has_gaps']) if title == 'Heat map' else ''}</figcaption></figure>"
-        for picture, title, caption in figures
-    ) + "</div>"  # fmt: skip
-
-
-def _legend(judge: Judge, has_gaps: bool) -> str:
-    stops = ",".join(css(color) for color in score_colors(np.linspace(0, 1, 9)))
-    gap = f'<span class="gap" style="background:{css(np.array(NO_PATCH))}"></span>no patch' if has_gaps else ""
-    ramp = f'<span class="ramp" style="background:linear-gradient(90deg,{stops})"></span>'
-    return f'<span class="legend">{judge.column} 0{ramp}1 {gap}</span>'
-
-
-def _close_ups(worst: Sequence[Record], judge: Judge) -> str:
-    if not worst:
-        return '<div><h4>Worst patches</h4><p class="note">None: every patch is like the reference\'s.</p></div>'
-    figures = "".join(
-        f'<figure><div class="picture two">{_image(each["reference"], f"Worst patch {rank}, reference")}'
-        f"{_image(each['distorted'], f'Worst patch {rank}, distorted')}</div>"
-        f"<figcaption><strong>{rank}</strong> {judge.column} {score_text(each[judge.column], places=3)}; "
-        f"{escape(each['blame'])} {score_text(each['value'], places=3)}</figcaption></figure>"
-        for rank, each in enumerate(worst, 1)
-    )
-    return (
-        f"<div><h4>Worst patches: reference, distorted; their {judge.column} and lowest feature of perceived</h4>"
-        f'<div class="close-ups">{figures}</div></div>'
-    )
-
-
-def _image(path: str, alt: str, size: tuple[int, int] | None = None) -> str:
-    sized = "" if size is None else ' width="{}" height="{}"'.format(*(escape(str(side)) for side in size))
-    return f'<img src="{escape(quote(path))}" alt="{escape(alt)}"{sized} loading="lazy">'
-
-
 def _parts(parts: Sequence[Record]) -> str:
-    """Each part's scores; those that are gone first."""
+    """What is worst by name, and each part's scores; those that are gone first."""
     rows = []
     for part in worst_first(parts):
         kind, name, *numbers, gone = part_cells(part)
         cells = "".join(f'<td class="number">{escape(number)}</td>' for number in numbers)
         note = f' <span class="bad">{gone}</span>' if gone else ""
         rows.append(f'<tr><th scope="row">{text(name)}{note}</th><td>{escape(kind)}</td>{cells}</tr>')
-    return (
-        f'<details><summary>Parts ({len(parts)})</summary><div class="scroll" tabindex="0" role="region" '
-        'aria-label="Parts"><table><thead><tr><th scope="col">Part</th><th scope="col">Kind</th>'
-        '<th scope="col">Triangles</th><th scope="col">Area</th><th scope="col">FMQM</th>'
-        f'<th scope="col">Perceived</th></tr></thead><tbody>{"".join(rows)}</tbody></table></div></details>'
+    heads = "".join(
+        f'<th scope="col" class="number">{name}</th>' for name in ("Triangles", "Area", "FMQM", "Perceived")
     )
+    table = (
+        f'<table><thead><tr><th scope="col">Part</th><th scope="col">Kind</th>{heads}</tr></thead>'
+        f"<tbody>{''.join(rows)}</tbody></table>"
+    )
+    worst = _worst_named(parts)
+    said = f'<p class="note">Worst: {worst}.</p>' if worst else ""
+    return f"{said}{folded(f'Parts ({len(parts)})', scrolled('Parts', table))}"
+
+
+def _worst_named(parts: Sequence[Record]) -> str:
+    """The object and the material that are worst, where one is worse than others of its kind."""
+    found = []
+    for kind in _NAMED:
+        alike = [part for part in parts if part["kind"] == kind and part["perceived"] is not None]
+        values = sorted(part["perceived"] for part in alike)
+        if len(values) > 1 and values[-1] - values[0] >= _ALIKE:
+            worst = min(alike, key=lambda part: part["perceived"])
+            found.append(f"{kind} {text(worst['name'])} ({LABELS['perceived']} {score_text(worst['perceived'])})")
+    return ", ".join(found)
 
 
 def _trust(trust: Report) -> str:
@@ -167,9 +172,8 @@ def _trust(trust: Report) -> str:
         rows.append(
             f'<tr><th scope="row">{text(line.label)}</th>{first}{last}<td class="faint">{text(line.unit)}</td></tr>'
         )
-    return (
-        '<details><summary>How far to trust this score</summary><div class="scroll" tabindex="0" role="region" '
-        'aria-label="Trust report"><table><thead><tr><td></td><th scope="col">Reference</th>'
-        f'<th scope="col">Distorted</th><th scope="col">Unit</th></tr></thead><tbody>{"".join(rows)}</tbody></table>'
-        "</div></details>"
+    table = (
+        f'<table><thead><tr><td></td><th scope="col">{ORIGINAL}</th><th scope="col">{LOD}</th>'
+        f'<th scope="col">Unit</th></tr></thead><tbody>{"".join(rows)}</tbody></table>'
     )
+    return folded("How far to trust this score", scrolled("Trust report", table))

@@ -6,7 +6,8 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,29 +15,30 @@ import numpy as np
 
 from ...comparison.judge import Judge
 from ...comparison.normals import corner_normals
+from ...comparison.places import place_name
 from ...metric.errors import FileError, OutputError
 from ...metric.evaluation import Result
+from ...metric.geometry import Floats
+from ...metric.queries import opened
 from ...metric.surface import Surface
 from ..atomic_files import check_writable, replaced
-from ..picture_files import SUFFIXES, encode, require_encoder
-from ..render import (
-    Camera,
-    Pixels,
-    is_seen,
-    natural_aspect,
-    render,
-    score_by_face,
-    three_views,
-)
+from ..heat import FRONT, heat_of, side_of_loss
+from ..picture_files import SUFFIXES, encode, require_encoder, shrunk
+from ..render import Camera, Pixels, is_seen, natural_aspect, render, render_all
 from ..texture_memory import texture_bytes
-from ..visual.worst import patch_view, worst_patches
+from ..visual.heat_map import histogram
+from ..visual.worst import WorstPatch, patch_view, worst_patches
 from .viewer.files import has_viewer_data
 
 PICTURES = "pictures"  # the folder beside the page
-VIEW_AREA = 560**2  # pixels of a view of the whole
-CLOSE_UP = 288  # pixels; width and height of a close-up
+LONG_SIDE = 1024  # pixels of a view of the whole
+THUMBNAIL = 320  # pixels of its smaller copy, the longer side
+CLOSE_UP = 448  # pixels; width and height of a close-up, which the page shows smaller until it is opened
 CLOSE_UPS = 3  # worst patches that are shown
 CLOSE_UP_MARGIN = 1.2  # a close-up is so many patch diagonals wide
+MESHES = ("reference", "distorted")
+KINDS = (*MESHES, "heat")  # of the pictures of a view
+LOSS, FRONT_VIEW = "loss", "front"  # views
 
 
 def open_report_folder(folder: str) -> None:
@@ -61,7 +63,14 @@ def has_pictures(folder: str | None, record: Mapping[str, Any], judge: Judge) ->
     pictures = record.get("pictures")
     if pictures is None or pictures["judge"] != judge:
         return False
-    return os.path.exists(os.path.join(folder, pictures["heat"])) and has_viewer_data(folder, record.get("viewer"))
+    is_whole = all(os.path.exists(os.path.join(folder, name)) for name in picture_files(pictures))
+    return is_whole and has_viewer_data(folder, record.get("viewer"))
+
+
+def picture_files(pictures: Mapping[str, Any]) -> Iterator[str]:
+    """Every picture of a pair, relative to the report's folder."""
+    for group, kinds in ((pictures["views"], KINDS), ([pictures["thumbnails"]], KINDS), (pictures["worst"], MESHES)):
+        yield from (each[kind] for each in group for kind in kinds)
 
 
 def picture_stem(*parts: str) -> str:
@@ -78,7 +87,7 @@ def picture_stem(*parts: str) -> str:
 def write_pair_pictures(
     folder: str, stem: str, reference: Surface, distorted: Surface, result: Result, judge: Judge
 ) -> dict[str, Any]:
-    """Reference, distorted surface and heat map on one camera, and the worst patches of both in close-up.
+    """Both surfaces and the heat map, from the side of the loss and from the front, and the worst patches in close-up.
 
     The heat map's colors and the worst patches are the judge's.
 
@@ -91,58 +100,120 @@ def write_pair_pictures(
     Raises:
         OutputError: a picture cannot be written.
     """
-    aspect = natural_aspect(reference, distorted)
-    width = round((VIEW_AREA / aspect) ** 0.5)
-    size = (width, round(width * aspect))
-    camera = Camera.framing(reference, distorted, aspect=size[1] / size[0])
-    faces = score_by_face(result, reference, judge.column)
-    views = three_views(reference, distorted, faces, camera, size)
-    names = ("reference", "distorted", "heat")
+    heat = heat_of(reference, result, judge)
+    with opened(reference.query):
+        loss = side_of_loss(reference, result, judge)
+        sides = {FRONT_VIEW: FRONT} if loss == FRONT else {LOSS: loss, FRONT_VIEW: FRONT}
+        views = [_View(name, *_framed(reference, distorted, side)) for name, side in sides.items()]
+        close_ups = _worst(result, judge)
+        normals = corner_normals(reference)
+        drawn: dict[str, Pixels] = {}
+        for view in views:
+            own, painted = render_all(reference, view.camera, view.size, (None, heat.paint), normals)
+            drawn |= {f"{view.name}-reference": own, f"{view.name}-heat": painted}
+        for each in close_ups:
+            seed = result.patch_centers[each.worst.patch]
+            each.marks.extend(
+                view.camera.place_of(seed) if is_seen(reference, view.camera, seed) else None for view in views
+            )
+        drawn |= _drawn_close_ups("reference", reference, close_ups, normals)
+    with opened(distorted.query):
+        normals = corner_normals(distorted)
+        for view in views:
+            drawn[f"{view.name}-distorted"] = render(distorted, view.camera, view.size, normals=normals)
+        drawn |= _drawn_close_ups("distorted", distorted, close_ups, normals)
+    # The meshes from the front, so that levels can be compared; the heat map from where it says most.
+    of_views = {**dict.fromkeys(MESHES, FRONT_VIEW), "heat": views[0].name}
+    thumbnails = {f"thumbnail-{kind}": _smaller(drawn[f"{view}-{kind}"]) for kind, view in of_views.items()}
+    named = {name: _write(folder, f"{stem}-{name}", pixels) for name, pixels in (drawn | thumbnails).items()}
     return {
-        **{name: _write(folder, f"{stem}-{name}", view) for name, view in zip(names, views, strict=True)},
-        "size": list(size),
-        "has_gaps": bool(np.isnan(faces).any()),
+        "views": [
+            {"name": view.name, "size": list(view.size), **{kind: named[f"{view.name}-{kind}"] for kind in KINDS}}
+            for view in views
+        ],
+        "thumbnails": {kind: named[f"thumbnail-{kind}"] for kind in KINDS},
+        "range": [heat.low, heat.high],
+        "histogram": histogram(heat.values, heat.low, heat.high).tolist(),
+        "has_gaps": heat.has_gaps,
         "judge": str(judge),
-        "worst": _close_ups(folder, stem, reference, distorted, result, judge, camera),
+        "worst": [
+            {kind: named[f"worst{number}-{kind}"] for kind in MESHES} | each.as_dict(reference, result)
+            for number, each in enumerate(close_ups, 1)
+        ],
         "triangles": [surface.preparation.given for surface in (reference, distorted)],
         "texture_bytes": [texture_bytes(surface) for surface in (reference, distorted)],
     }
 
 
-def _close_ups(
-    folder: str,
-    stem: str,
-    reference: Surface,
-    distorted: Surface,
-    result: Result,
-    judge: Judge,
-    overview: Camera,
-) -> list[dict[str, Any]]:
-    found = []
-    pair = {"reference": reference, "distorted": distorted}
-    surfaces = {name: (surface, corner_normals(surface)) for name, surface in pair.items()}
-    for number, worst in enumerate(worst_patches(result, CLOSE_UPS, judge), 1):
-        if worst.score == 1:  # nothing to see here, nor in those that follow
-            break
-        center, diagonal, normal = patch_view(result, worst.patch)
-        camera = Camera.facing(center, normal, CLOSE_UP_MARGIN * diagonal)
-        pictures = {
-            name: _write(
-                folder, f"{stem}-worst{number}-{name}", render(surface, camera, (CLOSE_UP, CLOSE_UP), normals=normals)
-            )
-            for name, (surface, normals) in surfaces.items()
+@dataclass(frozen=True)
+class _View:
+    """Of the whole: LOSS or FRONT_VIEW."""
+
+    name: str
+    camera: Camera
+    size: tuple[int, int]
+
+
+def _framed(reference: Surface, distorted: Surface, side: tuple[float, float]) -> tuple[Camera, tuple[int, int]]:
+    azimuth, elevation = side
+    aspect = natural_aspect(reference, distorted, azimuth=azimuth, elevation=elevation)
+    size = (round(LONG_SIDE / max(aspect, 1)), round(LONG_SIDE * min(aspect, 1)))
+    camera = Camera.framing(reference, distorted, aspect=size[1] / size[0], azimuth=azimuth, elevation=elevation)
+    return camera, size
+
+
+@dataclass(frozen=True)
+class _CloseUp:
+    """Of a worst patch; marks are its places in the views, None where it is hidden."""
+
+    worst: WorstPatch
+    camera: Camera
+    marks: list[tuple[float, float] | None]
+
+    def as_dict(self, reference: Surface, result: Result) -> dict[str, Any]:
+        """What its caption says."""
+        patch = self.worst.patch
+        low, high = reference.vertices.min(axis=0), reference.vertices.max(axis=0)
+        return {
+            **{each.column: float(result.of_patches(each.column)[patch]) for each in Judge},
+            "blame": self.worst.blame,
+            "value": self.worst.value,
+            "place": place_name(result.patch_centers[patch], low, high),
+            "object": _object_of(reference, result, patch),
+            "at": [None if mark is None else list(mark) for mark in self.marks],
         }
-        seed = result.patch_centers[worst.patch]
-        found.append(
-            {
-                **pictures,
-                **{each.column: float(result.of_patches(each.column)[worst.patch]) for each in Judge},
-                "blame": worst.blame,
-                "value": worst.value,
-                "at": overview.place_of(seed) if is_seen(reference, overview, seed) else None,
-            }
-        )
+
+
+def _worst(result: Result, judge: Judge) -> list[_CloseUp]:
+    """The worst patches, as far as anything is lost there."""
+    found = []
+    for worst in worst_patches(result, CLOSE_UPS, judge):
+        if worst.score < 1:
+            center, diagonal, normal = patch_view(result, worst.patch)
+            found.append(_CloseUp(worst, Camera.facing(center, normal, CLOSE_UP_MARGIN * diagonal), []))
     return found
+
+
+def _drawn_close_ups(kind: str, surface: Surface, close_ups: Sequence[_CloseUp], normals: Floats) -> dict[str, Pixels]:
+    size = (CLOSE_UP, CLOSE_UP)
+    return {
+        f"worst{number}-{kind}": render(surface, each.camera, size, normals=normals)
+        for number, each in enumerate(close_ups, 1)
+    }
+
+
+def _object_of(reference: Surface, result: Result, patch: int) -> str | None:
+    """The name of the object that most of a patch belongs to; None where there is only one."""
+    if len(reference.objects) < 2:
+        return None
+    parents = result.patch_mesh.parent[result.patches[patch].faces]
+    return reference.objects[int(np.bincount(reference.object[parents]).argmax())]
+
+
+def _smaller(view: Pixels) -> Pixels:
+    height, width = view.shape[:2]
+    share = THUMBNAIL / max(height, width)
+    return shrunk(view, (max(round(width * share), 1), max(round(height * share), 1)))
 
 
 def _write(folder: str, stem: str, view: Pixels) -> str:

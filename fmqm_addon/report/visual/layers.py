@@ -220,10 +220,10 @@ def legend(
     bar = tuple(tuple(color) for color in layer_colors(name, shown, low, high).tolist())
     if layer.kind == SCORE:
         numbers = round_ticks(low, high)
-        text = _number_text(numbers[1] - numbers[0] if len(numbers) > 1 else high - low)
+        text = number_text(numbers[1] - numbers[0] if len(numbers) > 1 else high - low)
     else:
         numbers = np.linspace(low, high, _TICKS).tolist()
-        text = length_text if layer.kind in (LENGTH, SIGNED) else _number_text((high - low) / (_TICKS - 1))
+        text = length_text if layer.kind in (LENGTH, SIGNED) else number_text((high - low) / (_TICKS - 1))
     ticks = tuple(((number - low) / (high - low), text(number)) for number in numbers)
     if layer.kind != SCORE:
         return Legend(layer.label, subtitle, bar, ticks)
@@ -233,7 +233,7 @@ def legend(
     return Legend(heading, subtitle, bar, ticks, (place, score_text(score)))
 
 
-def _number_text(step: float) -> Callable[[float], str]:
+def number_text(step: float) -> Callable[[float], str]:
     """Numbers with as many decimals as tell ticks that are a step apart."""
     decimals = int(np.clip(np.ceil(-np.log10(max(step, 1e-12)) - 1e-9), 1, 6))
     return lambda value: f"{value:.{decimals}f}"
