@@ -65,6 +65,7 @@ class Page:
         self._session = self._call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         for domain in ("Page", "Runtime", "Log"):
             self._call(f"{domain}.enable")
+        self._call("Performance.enable", timeDomain="threadTicks")
 
     def __enter__(self) -> Page:
         return self
@@ -98,8 +99,19 @@ class Page:
         assert "exceptionDetails" not in answer, answer["exceptionDetails"]
         return answer["result"].get("value")
 
+    def seconds(self, script: str) -> float:
+        """Processor time of the page's main thread until what an expression does is on the screen."""
+        before = self._task_seconds()
+        frames = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done))))"
+        self.run(f"(async () => {{ {script}; await {frames} }})()")
+        return self._task_seconds() - before
+
+    def _task_seconds(self) -> float:
+        metrics = self._call("Performance.getMetrics")["metrics"]
+        return next(float(each["value"]) for each in metrics if each["name"] == "TaskDuration")
+
     def press(self, key: str) -> None:
-        code = {"Enter": 13, "Tab": 9, "ArrowLeft": 37, "ArrowUp": 38}[key]
+        code = {"Enter": 13, "Tab": 9, "Escape": 27, "ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39}[key]
         text = {"text": "\r"} if key == "Enter" else {}
         for kind in ("keyDown", "keyUp"):
             self._call("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=code, **text)

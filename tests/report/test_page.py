@@ -63,8 +63,17 @@ def record(distorted: str = "lod.glb", score: float | None = 0.5, **others: Any)
 def costs(triangles: int, texture_bytes: int) -> dict[str, Any]:
     """What pictures say of a pair, without close-ups."""
     names = {name: f"pictures/{name}.jpg" for name in ("reference", "distorted", "heat")}
-    pair = {"triangles": [1000, triangles], "texture_bytes": [1 << 22, texture_bytes]}
-    return names | pair | {"size": [40, 30], "judge": "fmqm", "has_gaps": False, "worst": []}
+    return {
+        "views": [{"name": "front", "size": [40, 30], **names}],
+        "thumbnails": names,
+        "range": [0.5, 1.0],
+        "histogram": [1, 0, 3],
+        "triangles": [1000, triangles],
+        "texture_bytes": [1 << 22, texture_bytes],
+        "judge": "fmqm",
+        "has_gaps": False,
+        "worst": [],
+    }
 
 
 class Page(HTMLParser):
@@ -81,7 +90,7 @@ class Page(HTMLParser):
 
     def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
         self.tags.append((tag, dict(attributes)))
-        if tag not in {"meta", "link", "img", "br"}:
+        if tag not in {"meta", "link", "img", "br", "input"}:
             self._inside.append(tag)
 
     def handle_endtag(self, tag: str) -> None:
@@ -107,16 +116,22 @@ def test_pictures_of_a_pair(tmp_path: Path) -> None:
     assert made["triangles"] == [128, 2] and made["texture_bytes"] == [16, 16]
     worst = [patch["FMQM"] for patch in made["worst"]]
     assert worst == np.sort(result.patch_scores[:, 4])[:3].tolist()
-    views = [made[name] for name in ("reference", "distorted", "heat")]
-    close_ups = [patch[name] for patch in made["worst"] for name in ("reference", "distorted")]
-    assert sorted(views + close_ups) == sorted(f"pictures/{path.name}" for path in (tmp_path / "pictures").iterdir())
-    for name in views + close_ups:
+    assert made["views"][-1]["name"] == "front" and sum(made["histogram"]) == len(result.patches)
+    sizes = {view[kind]: tuple(view["size"]) for view in made["views"] for kind in pair_pictures.KINDS}
+    assert all(max(size) == pair_pictures.LONG_SIDE for size in sizes.values())
+    sizes |= dict.fromkeys(made["thumbnails"].values(), (pair_pictures.THUMBNAIL,) * 2)
+    sizes |= {patch[name]: (pair_pictures.CLOSE_UP,) * 2 for patch in made["worst"] for name in pair_pictures.MESHES}
+    files = sorted(pair_pictures.picture_files(made))
+    assert files == sorted(sizes) == sorted(f"pictures/{path.name}" for path in (tmp_path / "pictures").iterdir())
+    for name, size in sizes.items():
         with image.open(tmp_path / name) as decoded:
-            size = tuple(made["size"]) if name in views else (pair_pictures.CLOSE_UP,) * 2
-            assert decoded.format == "JPEG" and decoded.size == size
+            assert decoded.format == "JPEG" and (
+                max(decoded.size) == max(size) if "thumb" in name else decoded.size == size
+            )
             assert (np.abs(np.asarray(decoded).astype(int) - rendering.BACKGROUND) > 40).any()
     for patch in made["worst"]:  # all of the wall is seen
-        assert all(0 < place < 1 for place in patch["at"])
+        assert all(0 < share < 1 for place in patch["at"] for share in place)
+        assert patch["place"] and patch["object"] is None
 
 
 def test_equal_surfaces_have_no_worst_patches(tmp_path: Path) -> None:
@@ -128,7 +143,7 @@ def test_equal_surfaces_have_no_worst_patches(tmp_path: Path) -> None:
         str(tmp_path), "pair", reference, reference, replace(result, patch_scores=same), Judge.FMQM
     )
     assert made["worst"] == []
-    assert "None: every patch is like the reference" in Page(record(score=1.0, pictures=made)).text
+    assert "None: every patch is like the original" in Page(record(score=1.0, pictures=made)).text
 
 
 def two_walls(gap: float) -> Surface:
@@ -224,8 +239,9 @@ def test_names_from_strangers_stay_text() -> None:
 
 def test_numbers_from_strangers_stay_text() -> None:
     """Where they are not checked before, as merging does."""
-    for pictures in (costs(10, 1 << 20) | {"size": ['4" onload="alert(1)', '"><script>alert(1)</script>']},):
-        shown = Page(record(pictures=pictures))
+    pictures = costs(10, 1 << 20)
+    pictures["views"][0]["size"] = ['4" onload="alert(1)', '"><script>alert(1)</script>']
+    for shown in (Page(record(pictures=pictures)),):
         assert shown.count("script") == 1 and "<script>alert" not in shown.html
         assert not any(name.startswith("on") for _, attributes in shown.tags for name in attributes)
 
@@ -254,9 +270,9 @@ def test_pairs_are_told_apart_by_their_names() -> None:
 
 def test_every_pair_is_on_the_page() -> None:
     page = Page(record("good.glb", 0.875), record("bad.glb", None, error="bad.glb: is broken; repair it"))
-    assert "2 pairs, 1 reference. Lowest FMQM: 0.8750, good.glb. 1 not scored." in page.text
+    assert "2 LODs of ref.glb" in page.text and "Lowest FMQM 0.8750: good.glb. 1 not scored." in page.text
     assert page.count("article") == 2 and page.count("tr") == 3
-    assert "Not scored: bad.glb: is broken; repair it" in page.text
+    assert page.text.count("Not scored: bad.glb: is broken; repair it") == 2  # to be looked at first, and on its card
     assert page.count("svg") == 0
     for name, value in (("scored patches", "none"), ("samples", "2,000"), ("centers", "fps")):
         assert name in page.text and value in page.text
@@ -266,13 +282,14 @@ def test_every_pair_is_on_the_page() -> None:
 def test_a_chain_has_two_curves() -> None:
     chain = [record(f"lod{k}.glb", 0.9 - 0.1 * k, pictures=costs(500 >> k, 1 << (20 - k))) for k in range(3)]
     page = Page(*chain)
-    assert page.count("svg") == 2 and page.count("circle") == 2 * 4
+    histograms = len(chain)
+    assert page.count("svg") == 2 + histograms and page.count("circle") == 2 * 4
     apart = Page(*(each | {"reference": f"ref{k}"} for k, each in enumerate(chain)))
-    assert apart.count("svg") == 0
+    assert apart.count("svg") == histograms
     same = Page(*(each | {"pictures": costs(500 >> k, 1 << 22)} for k, each in enumerate(chain)))
-    assert same.count("svg") == 1 and "All levels have the same: 4 texture MB" in same.text
+    assert same.count("svg") == 1 + histograms and "All levels have the same: 4 texture MB" in same.text
     bare = Page(*(each | {"pictures": costs(500 >> k, 0)} for k, each in enumerate(chain)))
-    assert bare.count("svg") == 1 and "no curve against texture MB" in bare.text
+    assert bare.count("svg") == 1 + histograms and "no curve against texture MB" in bare.text
 
 
 def test_the_curve_rises_with_the_costs() -> None:
@@ -312,24 +329,66 @@ def test_the_page_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
 
 def test_words_losses_and_thresholds_are_shown_where_there_are_any() -> None:
     losses = {"geometry_loss": 0.01, "texture_loss": 0.4321, "phrase": "most of the loss is the texture"}
-    told = Page(record(explanation="It looks bad.", attribution=losses, fail_under=0.75))
+    losses |= {"mostly": "texture", "how": "same UVs"}
+    told = Page(record(attribution=losses, fail_under=0.75))
     for text in (
-        "It looks bad.",
+        "lod.glb differs from ref.glb",
         "Most of the loss is the texture: 0.010",
         "0.432 with",
         "Too low: FMQM 0.5000 is below 0.75.",
     ):
         assert text in told.text
     plain = Page(record(fail_under=0.5))
-    assert "loss" not in plain.text and "below" not in plain.text and "Too low" not in plain.text
+    assert "alone distorted" not in plain.text and "is below" not in plain.text and "Too low" not in plain.text
 
 
 def test_the_judge_names_the_scores() -> None:
     numbers = {"perceived": {**record()["perceived"], "score": 0.9, "p10": 0.25}}
     chain = [record(f"lod{k}.glb", pictures=costs(900 - k, 1 << k) | {"judge": "perceived"}) for k in (1, 2)]
     page = Page(*(each | numbers | Criteria(Judge.PERCEIVED, 0.75, 0.5).record_fields() for each in chain))
-    assert "Lowest perceived: 0.9000" in page.text and "perceived against triangles" in page.text
-    assert page.text.count("perceived_p10 0.2500 is below 0.5") == 4 and "0.9000 is below" not in page.text
+    assert "Lowest Perceived 0.9000: lod1.glb. 2 below the threshold." in page.text
+    assert "Perceived against triangles" in page.text
+    missed = "perceived_p10 0.2500 is below 0.5"
+    assert page.text.count(missed) == 2 * 4 and page.text.count(f"Too low: {missed}.") == 2
+    assert "Threshold: at least Perceived 0.75 and Worst Tenth 0.5" in page.text
+    assert "0.9000 is below" not in page.text
+
+
+def test_what_all_pairs_have_stands_once() -> None:
+    """Warnings, notes and sentences; a pair alone keeps its own."""
+    ours, theirs = "Both meshes are open.", "Only this one is."
+    chain = [record(f"lod{k}.glb", 0.5, warnings=[ours], notes=["Baked."]) for k in range(3)]
+    chain[1]["warnings"] = [ours, theirs]
+    page = Page(*chain, record("bad.glb", None))
+    sentence = "Above all the surface"
+    assert all(page.text.count(text) == 1 for text in (ours, theirs, "Baked.", sentence)), page.text
+    assert page.text.count("2 warnings") == 2 and page.text.count("1 warning") == 4  # on the tile, and to be looked at
+    alone = Page(chain[0])
+    assert alone.text.count(ours) == 1 and "True of every pair" not in alone.text
+
+
+def test_names_are_short_and_paths_are_in_tooltips() -> None:
+    page = Page(*(record(f"/far/away/lods/lod{k}.glb", reference="/far/away/rock.glb") for k in range(2)))
+    assert "/far/away" not in page.text and "lod1.glb differs from rock.glb" in page.text
+    titles = [attributes.get("title") or "" for _, attributes in page.tags]
+    assert any("/far/away/lods/lod1.glb" in title for title in titles) and "/far/away/rock.glb" in titles
+
+
+def test_what_is_worst_comes_first_and_is_named() -> None:
+    worst = {"reference": "pictures/a.jpg", "distorted": "pictures/b.jpg", "FMQM": 0.2, "perceived": 0.3, "value": 0.1,
+             "blame": "color", "place": "upper left", "object": "Lid", "at": [[0.5, 0.5]]}  # fmt: skip
+    parts = [
+        {"kind": "object", "name": name, "triangles": 4, "area": 0.5, "FMQM": seen, "perceived": seen, "missing": False}
+        for name, seen in (("Lid", 0.4), ("Body", 0.9))
+    ]
+    low = record("low.glb", 0.3, impairment="annoying", pictures=costs(10, 1) | {"worst": [worst]}, parts=parts)
+    fine = record("fine.glb", 0.999, impairment="imperceptible")
+    page = Page(fine, low, record("bad.glb", None))
+    first = page.text[page.text.index("Look at first") : page.text.index("Search names")]
+    assert "fine.glb" not in first and first.index("bad.glb") < first.index("low.glb")
+    assert "Annoying; worst: color at the upper left, on Lid" in first
+    assert "Worst: object Lid (Perceived 0.4000)." in page.text and "Upper left, Lid" in page.text
+    assert "Nothing stands out" in Page(fine, fine | {"id": "other"}).text
 
 
 # score.py --report
@@ -360,8 +419,8 @@ def test_a_report_from_workers_resumed_draws_what_is_missing(run: Path) -> None:
     batch = (*FILES, "--report", "jobs", "--journal", "jobs.jsonl")
     assert score(*batch, "--jobs", "2", cwd=run).returncode == 1
     whole = files(run / "whole")
-    assert files(run / "jobs") == whole and len(whole) == 1 + 2 * 9 + 1 + 2 + 2
-    kept, lost = sorted((run / "jobs" / "pictures").glob("*-heat.jpg"))
+    assert files(run / "jobs") == whole
+    kept, lost = sorted((run / "jobs" / "pictures").glob("*-thumbnail-heat.jpg"))
     lost.unlink()
     before = kept.stat().st_mtime_ns
     assert score(*batch, "--resume", cwd=run).returncode == 1
@@ -379,7 +438,8 @@ def test_a_report_is_merged_from_shards(run: Path) -> None:
     assert {name: data for name, data in merged.items() if name != page} == {
         name: data for name, data in whole.items() if name != page
     }
-    assert sorted(re.findall(rb"<h3>.*?</h3>", merged[page])) == sorted(re.findall(rb"<h3>.*?</h3>", whole[page]))
+    names = rb"<h3.*?>(.*?)</h3>"
+    assert sorted(re.findall(names, merged[page])) == sorted(re.findall(names, whole[page]))
 
 
 def test_a_report_that_cannot_be_written_is_said_before_any_work(run: Path) -> None:

@@ -185,7 +185,7 @@ def _reason(record: Record, missed: str) -> str:
         return f"Not scored: {record['error']}"
     parts = [missed] if missed else []
     if record["impairment"] not in (None, LEVELS[0]):
-        parts.append(record["impairment"])
+        parts.append(record["impairment"] if parts else record["impairment"].capitalize())
         pictures = record.get("pictures")
         if pictures and pictures["worst"]:
             worst = pictures["worst"][0]
@@ -194,8 +194,7 @@ def _reason(record: Record, missed: str) -> str:
     if record["warnings"]:
         count = len(record["warnings"])
         parts.append("1 warning" if count == 1 else f"{count} warnings")
-    said = "; ".join(parts)
-    return said[:1].upper() + said[1:]
+    return "; ".join(parts)
 
 
 def _note_reference(chain: Chain, record: Record) -> None:
