@@ -99,7 +99,7 @@ def test_resuming_with_another_judge_draws_pictures_and_scores_nothing_else(asse
         score(*report, "--judge", judge)
         assert {record["pictures"]["judge"] for record in read_json(made)["pairs"]} == {judge}
     page = (tmp_path / "page" / "index.html").read_text(encoding="utf-8")
-    assert "Reference colored by the perceived of" in page and "perceived 0<" in page
+    assert "Original colored by the Perceived of" in page and "<h4>Perceived of the patches</h4>" in page
 
 
 def test_the_picture_is_the_judges(assets: Path, tmp_path: Path) -> None:

@@ -148,9 +148,11 @@ def test_parts_of_different_code_do_not_mix(tmp_path: Path, name: str, capsys: p
 
 
 HOSTILE = '"><script>alert(1)</script>'
+NAMES = {name: f"pictures/{name}.jpg" for name in ("reference", "distorted", "heat")}
+VIEW = {"name": "front", "size": [4, 3], **NAMES}
 PICTURES = {
-    **{name: f"pictures/{name}.jpg" for name in ("reference", "distorted", "heat")},
-    "size": [4, 3], "triangles": [2, 1], "texture_bytes": [0, 0], "judge": "fmqm", "has_gaps": False, "worst": [],
+    "views": [VIEW], "thumbnails": NAMES, "range": [0.5, 1.0], "histogram": [1, 2], "triangles": [2, 1],
+    "texture_bytes": [0, 0], "judge": "fmqm", "has_gaps": False, "worst": [],
 }  # fmt: skip
 WORST = {
     "reference": "pictures/r.jpg",
@@ -159,8 +161,11 @@ WORST = {
     "perceived": 0.5,
     "value": 0.5,
     "blame": "x",
-    "at": None,
+    "place": "left",
+    "object": None,
+    "at": [None],
 }
+TEXTS = ("blame", "place", "object")  # of these, which may hold any
 
 
 def test_pictures_of_a_part_are_taken(tmp_path: Path) -> None:
@@ -179,9 +184,14 @@ def test_pictures_of_a_part_are_taken(tmp_path: Path) -> None:
         {"attribution": {"phrase": HOSTILE}},
         {"pictures": HOSTILE}, {"id": 7}, {"trust": {"reference": {}, "distorted": {}, "pair": HOSTILE}},
         *({"pictures": PICTURES | {name: HOSTILE}} for name in PICTURES),
-        *({"pictures": PICTURES | {"heat": path}} for path in ("//host/a.jpg", "../a.jpg", "pictures/../../a.jpg")),
-        {"pictures": PICTURES | {"size": [HOSTILE, 1]}}, {"pictures": PICTURES | {"triangles": [1, 1e308]}},
-        *({"pictures": PICTURES | {"worst": [WORST | {name: 7 if name == "blame" else HOSTILE}]}} for name in WORST),
+        *({"pictures": PICTURES | {"thumbnails": NAMES | {"heat": path}}}
+          for path in ("//host/a.jpg", "../a.jpg", "pictures/../../a.jpg")),
+        *({"pictures": PICTURES | {"views": [VIEW | {name: HOSTILE}]}} for name in VIEW),
+        {"pictures": PICTURES | {"views": [VIEW | {"size": [HOSTILE, 1]}]}}, {"pictures": PICTURES | {"views": []}},
+        {"pictures": PICTURES | {"range": [1.0, 1.0]}}, {"pictures": PICTURES | {"histogram": []}},
+        {"pictures": PICTURES | {"triangles": [1, 1e308]}},
+        *({"pictures": PICTURES | {"worst": [WORST | {name: 7 if name in TEXTS else HOSTILE}]}} for name in WORST),
+        {"pictures": PICTURES | {"worst": [WORST | {"at": []}]}},
     ],
     ids=str,
 )  # fmt: skip
