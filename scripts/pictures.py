@@ -23,7 +23,7 @@ import demo  # beside this file
 from PIL import Image
 
 LEVELS = ((0.4, 1024), (0.15, 512), (0.06, 256))  # of the report: triangles that are kept, side of the texture
-REPORT_SIZE = (1040, 1544)  # of the page; the picture is smaller
+REPORT_SIZE = (1280, 1880)  # of the page; the picture is smaller
 WIDTH = 880  # of the picture
 WINDOW_PICTURES = {"look": ("look", "units", "slice"), "compare": ("loupe",)}  # by what pictures_window.py does
 FLIP, FLIP_SIDE, HEADER = "flip.webp", 640, 52  # pixels; of the header above the view
@@ -63,7 +63,7 @@ def picture_of_report(out: Path, reference: Path) -> Path | None:
         return None
     levels = build_levels(out)
     names = [path.name for path in (reference, *reversed(levels))]  # relative: the page names what it is given
-    script("score.py", *names, "--report", "report", "--attribution", "--explain", folder=out)
+    script("score.py", *names, "--report", "report", "--attribution", folder=out)
     picture = out / "report.png"
     size = "{},{}".format(*REPORT_SIZE)
     page = (out / "report" / "index.html").as_uri()
