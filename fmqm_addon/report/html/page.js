@@ -30,6 +30,7 @@
   const SOME = 60;
   const box = one(".chains"), body = table.tBodies[0], more = one(".more");
   let wanted = "all", words = [], limit = SOME, laid = 0, waiting = [], rows = [];
+  const seen = new IntersectionObserver((entries) => entries.at(-1).isIntersecting && extend(SOME), { rootMargin: "600px" });
   function filter() {
     let count = 0;
     for (const pair of pairs) {
@@ -60,13 +61,14 @@
       box.append(section);
     }
     more.hidden = laid >= rows.length && body.rows.length >= rows.length;
+    seen.unobserve(more); // it tells of changes alone, and the button may be in view still
+    seen.observe(more);
   }
   function extend(by) {
     limit += by;
     layMore();
   }
   one("button", more).addEventListener("click", () => extend(SOME));
-  new IntersectionObserver((entries) => entries.some((entry) => entry.isIntersecting) && extend(SOME), { rootMargin: "600px" }).observe(more);
   // Cards that are closed stand outside of the page, but on paper.
   place.replaceChildren();
   addEventListener("beforeprint", () => {
