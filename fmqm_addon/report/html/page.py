@@ -31,7 +31,7 @@ POLICY = """default-src 'none'; base-uri 'none'; form-action 'none'; img-src 'se
 style-src 'unsafe-inline'; script-src 'sha256-{}' 'strict-dynamic'"""
 _STYLES = ("page.css", "card.css")
 _SCRIPTS = ("page.js", "pictures.js")
-_LIGHTBOX = """<dialog class="lightbox" aria-label="Picture"><figure><img alt=""><figcaption></figcaption></figure>
+_LIGHTBOX = """<dialog class="lightbox" aria-label="Picture"><figure><figcaption></figcaption></figure>
 <button type="button" class="before" aria-label="Picture before">‹</button>
 <button type="button" class="after" aria-label="Next picture">›</button>
 <button type="button" class="close" aria-label="Close">×</button></dialog>"""

@@ -1,11 +1,12 @@
 // Pictures open large; the arrow keys go to the others of the same view, which stand at the same place.
 (() => {
-  const box = document.querySelector(".lightbox"), image = box.querySelector("img"), caption = box.querySelector("figcaption");
+  const box = document.querySelector(".lightbox"), caption = box.querySelector("figcaption"), image = new Image();
   let group = [], at = 0;
   function show(place) {
     at = (place + group.length) % group.length;
     const link = group[at], small = link.querySelector("img");
     image.src = link.href;
+    caption.before(image);
     image.alt = small.alt;
     caption.textContent = `${small.alt} (${at + 1} of ${group.length})`;
   }
