@@ -142,10 +142,11 @@ def _chain(number: int, chain: Chain, overview: Overview) -> str:
 
 def _tile(line: Line, chain: Chain, overview: Overview) -> str:
     name = f'<span class="name">{text(line.name)}</span>'
+    kinds = {"distorted": "of-lod", "heat": "of-heat", "reference": "of-original"}
+    pictures = "".join(_thumbnail(line, kind, shown) for kind, shown in kinds.items())
     link = (
         f'<a class="tile" href="#pair-{line.number}" aria-expanded="false" title="{escape(line.paths)}">'
-        f'<span class="thumb">{_thumbnail(line, "distorted", "of-lod")}{_thumbnail(line, "heat", "of-heat")}</span>'
-        f"{name}</a>"
+        f'<span class="thumb">{pictures}</span>{name}</a>'
     )
     if line.error is not None:
         return f'<li class="level" data-number="{line.number}">{link}<p class="bad short">{text(line.error)}</p></li>'
