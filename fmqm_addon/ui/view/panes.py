@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from ...metric.geometry import Floats
 from ...metric.stepper import Work, as_part
-from ...report.render import Camera, Pixels, hitting_pixels, rendering
+from ...report.render import Camera, Pixels, rendering
 from ...report.visual.heat_map import patches_at
 from .. import session
 
@@ -37,8 +37,7 @@ def drawing(measured: session.Measured, camera: Camera, side: int, colors: Float
     reference, lod, result = measured.reference, measured.comparison.distorted, measured.comparison.result
     faces = colors[patches_at(reference.vertices[reference.triangles].mean(axis=1), result, result.ref)]
     size = (side, side)
-    hits = yield from as_part(hitting_pixels(reference, camera, size), 0.0, 0.3)
-    original = yield from as_part(rendering(reference, camera, size, hits=hits), 0.3, 0.2)
-    heat = yield from as_part(rendering(reference, camera, size, faces, hits), 0.5, 0.1)
-    other = yield from as_part(rendering(lod, camera, size), 0.6, 0.4)
+    (original,) = yield from as_part(rendering(reference, camera, size, (None,)), 0.0, 0.3)
+    (heat,) = yield from as_part(rendering(reference, camera, size, (lambda hit, *_: faces[hit],)), 0.3, 0.3)
+    (other,) = yield from as_part(rendering(lod, camera, size, (None,)), 0.6, 0.4)
     return Panes(original, other, heat)
