@@ -211,6 +211,7 @@ class _Scorer:
 
     def _viewer(self, row: Row, stem: str, answer: PairResult) -> dict[str, str]:
         """What can be turned around on the page; of the reference once for its group."""
+        from ..report.heat import side_of_loss
         from ..report.html.pictures import picture_stem
         from ..report.html.viewer.files import write_pair_data, write_reference_data
 
@@ -218,9 +219,9 @@ class _Scorer:
         if self._reference_file is None:
             own = picture_stem(row.ref_texture, row.reference)
             self._reference_file = write_reference_data(folder, own, answer.reference)
-        return write_pair_data(
-            folder, stem, self._reference_file, comparison.distorted, comparison.result, self._options.judge
-        )
+        judge, result = self._options.judge, comparison.result
+        side = side_of_loss(answer.reference, result, judge)
+        return write_pair_data(folder, stem, self._reference_file, comparison.distorted, result, judge, side)
 
     def _screen_sizes(self, reference: AssetMesh) -> ScreenSizes | None:
         if not self._options.screen_size:

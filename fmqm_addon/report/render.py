@@ -36,7 +36,7 @@ AMBIENT, SCORE_AMBIENT = 0.5, 0.65  # shade of a face edge-on; colors that mean 
 LIGHT = (-0.45, 0.55, 1.0)  # direction to the headlight: right, up, towards the camera
 CONTRAST = 0.16  # pixels that differ this much from a neighbor get more rays
 MORE_RAYS = np.array([(-1, -3), (3, -1), (1, 3), (-3, 1)]) / 8  # a turned square: no two in a row or column
-BATCH = 1 << 14  # rays at once: few enough for a processor's cache
+BATCH = 1 << 13  # rays of a step: few enough for a processor's cache
 TILE = 8  # pixels; width and height of what is left out where nothing can be seen
 HIDDEN_BEHIND = 0.01  # of the frame: what lies this much deeper than what is seen is hidden
 
@@ -181,12 +181,13 @@ def rendering(
     casting = _casting(surface, camera, size, columns[near], rows[near], paints, normals)
     for image, colors in zip(images, (yield from as_part(casting, 0.0, 0.6)), strict=True):
         image[near] = colors
-    rough = np.flatnonzero(np.any([_differs(image.reshape(size[1], size[0], 3)) for image in images], axis=0))
+    rough = [_differs(image.reshape(size[1], size[0], 3)).ravel() for image in images]
+    again = np.flatnonzero(np.any(rough, axis=0))
     across, down = MORE_RAYS.T
-    columns, rows = (columns[rough, None] + across).ravel(), (rows[rough, None] + down).ravel()
+    columns, rows = (columns[again, None] + across).ravel(), (rows[again, None] + down).ravel()
     casting = _casting(surface, camera, size, columns, rows, paints, normals)
-    for image, colors in zip(images, (yield from as_part(casting, 0.6, 0.4)), strict=True):
-        image[rough] = colors.reshape(len(rough), len(MORE_RAYS), 3).mean(axis=1)
+    for image, here, colors in zip(images, rough, (yield from as_part(casting, 0.6, 0.4)), strict=True):
+        image[here] = colors.reshape(len(again), len(MORE_RAYS), 3).mean(axis=1)[here[again]]
     return [(image.reshape(size[1], size[0], 3) * 255 + 0.5).astype(np.uint8) for image in images]
 
 

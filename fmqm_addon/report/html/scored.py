@@ -14,6 +14,7 @@ from ...metric.stepper import Progress, Work
 from ...metric.surface import Surface
 from ..criteria import Criteria
 from ..explain import explain, where
+from ..heat import side_of_loss
 from ..picture_files import Encoder, encoded_by
 from ..records import Costs, PairScore, pair_record
 from ..texture_memory import texture_bytes
@@ -74,9 +75,10 @@ def _record(folder: str, pair: ScoredPair, judge: Judge, files: dict[int, Refere
         if id(reference) not in files:
             own = picture_stem(str(len(files)), score.reference)  # it may have changed between two measurements
             files[id(reference)] = write_reference_data(folder, own, reference)
+        side = side_of_loss(reference, result, judge)
         findings = {
             "pictures": write_pair_pictures(folder, stem, reference, distorted, result, judge),
-            "viewer": write_pair_data(folder, stem, files[id(reference)], distorted, result, judge),
+            "viewer": write_pair_data(folder, stem, files[id(reference)], distorted, result, judge, side),
             "where": where(reference, result),
         }
         costs = Costs(given, given / whole, texture_bytes(distorted))

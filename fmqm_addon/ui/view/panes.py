@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ...metric.geometry import Floats
+from ...metric.geometry import Floats, Ints
 from ...metric.stepper import Work, as_part
 from ...report.render import Camera, Pixels, rendering
 from ...report.visual.heat_map import patches_at
@@ -35,9 +35,11 @@ def drawing(measured: session.Measured, camera: Camera, side: int, colors: Float
         colors: (P + 1, 3) encoded, of the patches, and of what none covers.
     """
     reference, lod, result = measured.reference, measured.comparison.distorted, measured.comparison.result
-    faces = colors[patches_at(reference.vertices[reference.triangles].mean(axis=1), result, result.ref)]
+
+    def paint(_: Ints, points: Floats, __: Floats) -> Floats:
+        return colors[patches_at(points, result, result.ref)]
+
     size = (side, side)
-    (original,) = yield from as_part(rendering(reference, camera, size, (None,)), 0.0, 0.3)
-    (heat,) = yield from as_part(rendering(reference, camera, size, (lambda hit, *_: faces[hit],)), 0.3, 0.3)
+    original, heat = yield from as_part(rendering(reference, camera, size, (None, paint)), 0.0, 0.6)
     (other,) = yield from as_part(rendering(lod, camera, size, (None,)), 0.6, 0.4)
     return Panes(original, other, heat)
