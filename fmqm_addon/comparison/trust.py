@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from ..metric.evaluation import Result
 from ..metric.fields import Fields
 from ..metric.geometry import Floats, dot
-from ..metric.queries import closest_on
+from ..metric.queries import closest_on, normals_at
 from ..metric.stepper import Progress, Work, as_part
-from ..metric.surface import Surface, triangle_normals
+from ..metric.surface import Surface
 from ..metric.texture import MISSING, ImageFacts, Material
 from .color_shift import color_shifts
 from .distances import POINTS, Apart, apart
@@ -75,7 +75,7 @@ def assessing(
     compared = ((reference, result.ref), (distorted, result.dist))
     normals = []
     for surface, fields in compared:
-        normals.append(triangle_normals(surface.vertices, surface.triangles.take(fields.triangle, axis=0)))
+        normals.append(normals_at(surface, fields.triangle))
         yield Progress("", 0.4)
     doubtful = [
         in_doubt(fields, result.samples.positions, normal)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .geometry import Floats, Ints, closest_on_triangles, cross, dot
 from .stepper import Progress, Work, as_part, finish
-from .surface import Surface, SurfaceQuery
+from .surface import Surface, SurfaceQuery, triangle_normals
 
 # A ray goes on this far behind a hit, some float32 steps, so as not to find the same place again.
 RAY_STEP = 1e-6
@@ -247,3 +247,10 @@ def closest_on(surface: Surface, points: Floats, triangle: Ints) -> tuple[Floats
     corners = surface.triangles.take(triangle, axis=0)
     a, b, c = (surface.vertices.take(corners[:, k], axis=0) for k in range(3))
     return closest_on_triangles(points, a, b, c)
+
+
+def normals_at(surface: Surface, triangle: Ints) -> Floats:
+    """(N, 3) unit normals of (N,) triangles, which may come again and again: each is computed once, where that pays."""
+    if len(surface.triangles) > len(triangle):
+        return triangle_normals(surface.vertices, surface.triangles.take(triangle, axis=0))
+    return np.ascontiguousarray(triangle_normals(surface.vertices, surface.triangles)).take(triangle, axis=0)

@@ -9,9 +9,9 @@ from collections.abc import Callable
 import numpy as np
 
 from .geometry import Floats, Ints, cross, dot, first_of_each, lengths, ranges
-from .queries import closest_on
+from .queries import closest_on, normals_at
 from .stepper import Progress, Work, finish
-from .surface import Surface, triangle_normals
+from .surface import Surface
 
 # Below the resolution of a float32 tree in a box of diagonal 1, p - p_n has no direction: p = p_n.
 ON_SURFACE = 1e-9
@@ -130,7 +130,7 @@ def _settling_edges(
         candidates, candidate_weights = closest_on(surface, asked, face)
         away = asked - candidates
         distance = np.sqrt(dot(away, away))
-        facing = np.abs(dot(away, triangle_normals(surface.vertices, surface.triangles.take(face, axis=0))))
+        facing = np.abs(dot(away, normals_at(surface, face)))
         start = first_of_each(row)
         count = np.diff(start, append=len(row))
         least = np.repeat(np.minimum.reduceat(distance, start), count)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -52,6 +53,13 @@ class MeshArrays:
     object: NDArray[Any] | None = None
     rounding: float = 0.0
     normals: NDArray[Any] | None = None
+
+    @cached_property
+    def on_faces(self) -> Floats:
+        """(n, 3) the positions that triangles use, in their order."""
+        used = np.zeros(len(self.positions), bool)
+        used[self.triangles] = True
+        return self.positions if used.all() else self.positions[used]
 
 
 def join_meshes(parts: Sequence[MeshArrays], name: str) -> MeshArrays:

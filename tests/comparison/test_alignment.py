@@ -190,13 +190,11 @@ def test_a_factor_has_the_shape_too() -> None:
 def test_boxes_look_at_faces_and_finite_coordinates_only() -> None:
     reference, compared = asset(at()), asset(at())
     positions = np.concatenate([compared.mesh.positions, [(100.0, 0, 0)]])
-    stray = AssetMesh(MeshArrays(**{**compared.mesh.__dict__, "positions": positions}), at())
+    stray = AssetMesh(replace(compared.mesh, positions=positions), at())
     assert align(reference, stray).misfit == 0
     broken = positions.copy()
     broken[0] = np.nan
-    assert np.isfinite(
-        align(reference, AssetMesh(MeshArrays(**{**stray.mesh.__dict__, "positions": broken}), at())).misfit
-    )
+    assert np.isfinite(align(reference, AssetMesh(replace(stray.mesh, positions=broken), at())).misfit)
 
 
 def test_misfit_is_in_diagonals_of_the_target() -> None:

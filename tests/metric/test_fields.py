@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from fmqm_addon.metric import queries, settling
 from fmqm_addon.metric.fields import Fields, evaluate_fields
 from fmqm_addon.metric.geometry import Floats, Ints, morton_order
-from fmqm_addon.metric.queries import _coarse_to_fine, _guide, count_crossings, count_crossings_of_all
+from fmqm_addon.metric.queries import _coarse_to_fine, _guide, count_crossings, count_crossings_of_all, normals_at
 from fmqm_addon.metric.stepper import Work
-from fmqm_addon.metric.surface import MeshArrays, Surface, prepare_surface
+from fmqm_addon.metric.surface import MeshArrays, Surface, prepare_surface, triangle_normals
 from fmqm_addon.metric.texture import PlainColor
 
 from .meshes import TETRAHEDRON, cube, grid, icosahedron, materials, sphere, surface, texture
@@ -262,3 +262,29 @@ def test_the_hub_of_a_fan_is_settled_in_parts(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(settling, "_CANDIDATES", 1)
     parts = fields_at(shape, points)
     assert np.array_equal(whole.triangle, parts.triangle) and np.array_equal(whole.nearest, parts.nearest)
+
+
+@pytest.mark.parametrize("count", [3, 500])
+def test_normals_at_faces_few_or_many_times(count: int) -> None:
+    """Of each face asked for, or of all faces once where fewer: the same ones."""
+    shape = surface(icosahedron())
+    triangle = np.random.default_rng(count).integers(0, len(shape.triangles), count)
+    asked = triangle_normals(shape.vertices, shape.triangles[triangle])
+    assert np.array_equal(normals_at(shape, triangle), asked)
+
+
+@given(seeds, st.integers(1, 60))
+def test_heights_known_before_change_nothing(seed: int, count: int) -> None:
+    """A query that answers many at once is asked again close to edges, by the heights of triangles."""
+    shape = surface(displaced("cut cube", seed), (texture(1),))
+    points = np.random.default_rng(seed).uniform(-0.6, 0.6, (count, 3))
+    triangle = shape.query.nearest(points, None)
+    asked: list[int] = []
+
+    def again(points: Floats, bounds: Floats) -> Ints:
+        asked.append(len(points))
+        return shape.query.nearest(points, bounds * 1.001 + 1e-6)
+
+    found = [result_of(settling.settling(shape, points, triangle, function)) for function in (None, again)]
+    for one, other in zip(*found, strict=True):
+        assert np.array_equal(one, other)

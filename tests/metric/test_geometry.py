@@ -8,7 +8,16 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from fmqm_addon.metric.geometry import Floats, closest_on_triangles, cross, dot, morton_order
+from fmqm_addon.metric.geometry import (
+    Floats,
+    closest_on_triangles,
+    cross,
+    dot,
+    first_of_each,
+    lengths,
+    morton_order,
+    weighted,
+)
 
 from .oracles import NaiveQuery, exact_distance, squared_distances
 
@@ -132,3 +141,33 @@ def test_cross_and_dot_are_numpys(seed: int) -> None:
     a, b = np.random.default_rng(seed).normal(size=(2, 5, 3))
     np.testing.assert_allclose(cross(a, b), np.cross(a, b), rtol=1e-15)
     np.testing.assert_allclose(dot(a, b), (a * b).sum(axis=1), rtol=1e-13, atol=1e-15)
+
+
+@given(seeds, st.integers(1, 40), st.integers(2, 5))
+def test_rows_of_memory_change_no_digit(seed: int, count: int, width: int) -> None:
+    """What goes along the axes has, to the last bit, what numpy's own functions have."""
+    rng = np.random.default_rng(seed)
+    weights, rows = rng.random((count, 3)), rng.normal(size=(3, count, width))
+    by_einsum = np.einsum("nk,nkc->nc", weights, np.stack(list(rows), axis=1))
+    assert np.array_equal(weighted(weights, *rows), by_einsum)
+    for vectors in (rng.normal(size=(count, 3)), np.asfortranarray(rng.normal(size=(count, 3)))):
+        assert np.array_equal(lengths(vectors), np.linalg.norm(vectors, axis=1))
+        assert np.array_equal(cross(vectors, weights), np.cross(vectors, weights))
+
+
+@given(st.lists(st.integers(0, 5), max_size=30))
+def test_first_of_each(values: list[int]) -> None:
+    ascending = np.array(sorted(values), np.int64)
+    assert first_of_each(ascending).tolist() == [sorted(values).index(value) for value in sorted(set(values))]
+
+
+@given(seeds, st.integers(1, 300), st.sampled_from([1, 3, 1000]))
+def test_points_of_one_cell_keep_their_order(seed: int, count: int, cells: int) -> None:
+    points = np.random.default_rng(seed).integers(0, cells, (count, 3)) / cells
+    order = morton_order(points)
+    assert sorted(order.tolist()) == list(range(count))
+    groups: dict[tuple[float, ...], list[int]] = {}
+    for index in order.tolist():
+        groups.setdefault(tuple(points[index]), []).append(index)
+    if cells < 1000:  # then a cell of the curve holds one place only
+        assert all(group == sorted(group) for group in groups.values())
