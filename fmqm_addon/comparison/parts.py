@@ -18,7 +18,7 @@ from ..metric.evaluation import COLUMNS, Result
 from ..metric.geometry import Floats, Ints
 from ..metric.perceived import PERCEIVED_COLUMNS
 from ..metric.stepper import Progress, Work
-from ..metric.surface import Surface, triangle_areas
+from ..metric.surface import Surface
 from .distances import points_at, squared_distances
 from .places import place_name
 from .surface_facts import NO_MATERIAL, box_of
@@ -102,7 +102,7 @@ class PartsReport:
 
 def groupings(surface: Surface) -> Work[tuple[Grouping, ...]]:
     """A surface by objects, connected parts and materials; yields the share done."""
-    areas = triangle_areas(surface.vertices, surface.triangles)
+    areas = surface.areas
     yield Progress("", 0.2)
     connected = connected_parts(surface.triangles)
     yield Progress("", 0.6)

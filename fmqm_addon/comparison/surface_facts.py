@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..metric.geometry import Floats, Ints, ranges
 from ..metric.stepper import Progress, Work
-from ..metric.surface import Surface, triangle_areas
+from ..metric.surface import Surface
 from ..metric.texture import ImageFacts
 
 NO_MATERIAL = "(no material)"
@@ -45,7 +45,7 @@ def surface_facts(surface: Surface) -> Work[tuple[Fact, ...]]:
     preparation = surface.preparation
     open_edges, non_manifold = edge_counts(surface.triangles)
     yield Progress("", 0.1)
-    areas = triangle_areas(surface.vertices, surface.triangles)
+    areas = surface.areas
     layers, uv = _textured(surface)
     yield Progress("", 0.2)
     overlapping = yield from overlapping_share(uv, layers[layers >= 0])
@@ -71,11 +71,14 @@ def surface_facts(surface: Surface) -> Work[tuple[Fact, ...]]:
 
 def edge_counts(triangles: Ints) -> tuple[int, int]:
     """How many edges of the welded triangles have one face, and how many more than two."""
-    first, second = triangles, np.roll(triangles, -1, axis=1)
-    keys = np.sort((np.minimum(first, second) * (int(triangles.max()) + 1) + np.maximum(first, second)).ravel())
-    start = np.flatnonzero(np.diff(keys, prepend=-1))
-    faces = np.diff(start, append=len(keys))
-    return int(np.count_nonzero(faces == 1)), int(np.count_nonzero(faces > 2))
+    a, b, c = triangles.T
+    width = int(triangles.max()) + 1
+    keys = np.concatenate([np.minimum(x, y) * width + np.maximum(x, y) for x, y in ((a, b), (b, c), (c, a))])
+    keys.sort()
+    changes = np.concatenate([[True], keys[1:] != keys[:-1], [True]])
+    is_first, is_last = changes[:-1], changes[1:]
+    more = is_first[:-2] & (keys[2:] == keys[:-2])
+    return int(np.count_nonzero(is_first & is_last)), int(np.count_nonzero(more))
 
 
 def overlapping_share(uv: Floats, layers: Ints) -> Work[float | None]:

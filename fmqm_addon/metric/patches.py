@@ -70,7 +70,7 @@ def build_patch_mesh(surface: Surface, n_patches: int) -> Work[PatchMesh]:
     """
     vertices, triangles = surface.vertices, surface.triangles
     parent = np.arange(len(triangles))
-    areas = triangle_areas(vertices, triangles)
+    areas = surface.areas
     yield Progress("", 0.2)
     was_split = False
     if len(vertices) < n_patches:

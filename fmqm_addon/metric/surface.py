@@ -183,6 +183,11 @@ class Surface:
     notes: tuple[str, ...]
     normals: Floats | None = None
 
+    @cached_property
+    def areas(self) -> Floats:
+        """(T,) of the triangles."""
+        return triangle_areas(self.vertices, self.triangles)
+
     def color_at(self, triangle: Ints, barycentric: Floats) -> Floats:
         """Equations (5) to (7): (N, 3) float64 sRGB colors at barycentric (N, 3) places of (N,) triangles."""
         values = self._interpolated(triangle, barycentric)

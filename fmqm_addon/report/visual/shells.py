@@ -11,7 +11,7 @@ from ...metric.fields import Fields, evaluate_fields
 from ...metric.geometry import Floats, Ints, morton_order
 from ...metric.sampling import draw_barycentric, triangles_evenly
 from ...metric.stepper import finish
-from ...metric.surface import Surface, triangle_areas, triangle_normals
+from ...metric.surface import Surface, triangle_normals
 
 SHELLS = 5  # as in the supplement's figure
 
@@ -42,7 +42,7 @@ def shell_points(surface: Surface, count: int, distance: float, seed: int = 0) -
         count: of each shell. distance: between shells in units of the frame; the first is the surface.
     """
     rng = np.random.default_rng(seed)
-    areas = triangle_areas(surface.vertices, surface.triangles)
+    areas = surface.areas
     corners = surface.triangles[triangles_evenly(areas, np.full(count, rng.random()))]
     base = np.einsum("nk,nkc->nc", draw_barycentric(rng, count), surface.vertices[corners])
     normals = triangle_normals(surface.vertices, corners)
