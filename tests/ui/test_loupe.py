@@ -16,6 +16,7 @@ from fmqm_addon.report.html.pictures import CLOSE_UP_MARGIN
 from fmqm_addon.report.render import Camera, render
 from fmqm_addon.report.visual.worst import patch_view
 from fmqm_addon.ui import session
+from fmqm_addon.ui.operators.loupe import FMQM_OT_loupe
 from fmqm_addon.ui.view import loupe, panes, sight, worst
 from fmqm_addon.ui.view.result import why_not
 from tests.ui.test_look import measured, scene  # noqa: F401  the fixtures
@@ -101,6 +102,42 @@ def test_closing_stops_the_work_and_nothing_is_left(opened: loupe.Loupe) -> None
     loupe.close()
     assert loupe.shown is None and not opened.work.step()
     assert [len(getattr(bpy.data, kind)) for kind in kinds] == before
+
+
+class Running:
+    """The operator while it runs, as far as its modal function needs it."""
+
+    def __init__(self, shown: loupe.Loupe) -> None:
+        region = SimpleNamespace(type="WINDOW", x=0, y=0, width=800, height=600)
+        self._area, self._shown, self.moved = SimpleNamespace(regions=[region]), shown, 0
+        workspace = SimpleNamespace(status_text_set=lambda _: None)
+        self.context = SimpleNamespace(workspace=workspace, scene=bpy.context.scene)
+
+    def gets(self, kind: str, value: str = "PRESS") -> str:
+        event = SimpleNamespace(type=kind, value=value, mouse_x=400, mouse_y=300)
+        (answer,) = FMQM_OT_loupe.modal(self, self.context, event)
+        return answer
+
+    def _move(self, *_: object) -> None:
+        self.moved += 1
+
+    def _finish(self, context: Any) -> set[str]:
+        return FMQM_OT_loupe._finish(self, context)
+
+
+def test_clicks_hold_the_place_keys_step_and_escape_closes(opened: loupe.Loupe) -> None:
+    running = Running(opened)
+    assert not opened.follows, "it was opened at a worst place"
+    assert running.gets("LEFTMOUSE") == "RUNNING_MODAL" and opened.follows
+    assert running.gets("MOUSEMOVE") == "PASS_THROUGH" and running.moved == 2
+    running._area.type = ""  # no view is framed
+    look = bpy.context.scene.fmqm.look
+    for key, index in (("PAGE_DOWN", 1), ("PAGE_DOWN", 2), ("PAGE_UP", 1)):
+        assert running.gets(key) == "RUNNING_MODAL" and look.worst_index == index
+    loupe.refresh()
+    assert not opened.follows and opened.sight.title.startswith("Worst place 2")
+    assert running.gets("MIDDLEMOUSE") == "PASS_THROUGH", "the view can be turned"
+    assert running.gets("ESC") == "FINISHED" and loupe.shown is None
 
 
 def from_above(center: np.ndarray) -> tuple[Any, Any]:
