@@ -15,7 +15,7 @@ EXTENSION_TOOL = $(RUN) $(VENV)/lib/python*/site-packages/bpy/*/scripts/addons_c
 # By the hashes of their files: what an index or a mirror serves otherwise is not installed.
 INSTALL = $(RUN) -m pip install --quiet --disable-pip-version-check --require-hashes
 
-.PHONY: demo pictures extension test test-all stress bench lint lock three clean
+.PHONY: demo pictures extension test test-all stress bench evidence lint lock three clean
 
 demo: $(VENV)/runs
 	$(RUN) scripts/demo.py --out out/demo
@@ -48,6 +48,11 @@ stress: $(VENV)/tests
 
 bench: $(VENV)/runs
 	$(RUN) scripts/bench.py $(ARGS)
+
+# docs/evidence.md and its plots, in at most an hour on two cores; goes on where it was stopped. FMQM_MODELS names the
+# folder of the models that others made. ARGS=--smoke: a small one, which only shows that it runs.
+evidence: $(VENV)/tests
+	$(RUN) scripts/evidence.py $(ARGS)
 
 lint: $(VENV)/tests
 	$(VENV)/bin/ruff check .

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections import Counter
 from io import BytesIO
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -88,6 +89,16 @@ def test_alpha_is_not_compressed() -> None:
     pixels = np.dstack([noise(32), noise(32, seed=1)[..., 0]])
     worse = worse_texture(pixels, _on_texture(codec="WEBP", quality=10))
     assert np.array_equal(worse[..., 3], pixels[..., 3]) and not np.array_equal(worse[..., :3], pixels[..., :3])
+
+
+@pytest.mark.parametrize("model", ["spot", "egyptian_cat"])
+@pytest.mark.parametrize("name", ["DS_3", "TMC_3"])
+def test_as_others_have_made_it(shared_data: Path, model: str, name: str) -> None:
+    """Textures of the same kinds and levels, to the bit."""
+    (level,) = (each for each in DISTORTIONS if each.name == name)
+    original = np.asarray(Image.open(shared_data / "objpng" / model / f"{model}.png").convert("RGB"))
+    expected = np.asarray(Image.open(shared_data / "pairs" / model / name.lower() / "tex.png").convert("RGB"))
+    assert np.array_equal(worse_texture(original, level), expected)
 
 
 def _on_texture(**does: object) -> Distortion:
