@@ -33,7 +33,7 @@ from .viewer.files import has_viewer_data
 PICTURES = "pictures"  # the folder beside the page
 LONG_SIDE = 1024  # pixels of a view of the whole
 THUMBNAIL = 320  # pixels of its smaller copy, the longer side
-CLOSE_UP = 448  # pixels; width and height of a close-up, which the page shows smaller until it is opened
+CLOSE_UP = 320  # pixels; width and height of a close-up
 CLOSE_UPS = 3  # worst patches that are shown
 CLOSE_UP_MARGIN = 1.2  # a close-up is so many patch diagonals wide
 MESHES = ("reference", "distorted")
