@@ -13,8 +13,7 @@ from ..comparison.impairment import IMPAIRMENTS
 from ..comparison.judge import Judge
 from ..metric.perceived import Perceived
 from .explain import explain
-from .html.pictures import FRONT_VIEW, KINDS, LOSS, MESHES
-from .html.viewer.files import is_viewer
+from .html.kept import FRONT_VIEW, KINDS, LOSS, MESHES, is_viewer
 from .records import RECORD_KEYS, SHOWN, STAGES
 from .trust_table import GROUPS, trust_lines
 

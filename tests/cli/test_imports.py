@@ -11,6 +11,7 @@ ROOT = Path(__file__).resolve().parents[2]
 UNNEEDED = (
     "asyncio", "importlib.metadata", "xml.etree.ElementTree", "zipfile",
     "fmqm_addon.batch.cluster", "fmqm_addon.report.html.page", "fmqm_addon.report.render", "fmqm_addon.report.sheet",
+    "fmqm_addon.report.html.pictures",
 )  # fmt: skip
 
 

@@ -21,8 +21,9 @@ from fmqm_addon.metric.evaluation import Evaluation, Result
 from fmqm_addon.metric.geometry import Floats
 from fmqm_addon.metric.surface import MeshArrays, Surface, prepare_surface
 from fmqm_addon.metric.texture import Material, Placement, PlainColor, Texture
+from fmqm_addon.report.html.kept import is_viewer
 from fmqm_addon.report.html.viewer import images, skins
-from fmqm_addon.report.html.viewer.files import has_viewer_data, is_viewer, write_pair_data, write_reference_data
+from fmqm_addon.report.html.viewer.files import has_viewer_data, write_pair_data, write_reference_data
 from fmqm_addon.report.html.viewer.heat import heat_data
 from fmqm_addon.report.html.viewer.markup import viewer_markup
 from fmqm_addon.report.html.viewer.mesh import mesh_data

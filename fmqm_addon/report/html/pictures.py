@@ -28,6 +28,7 @@ from ..render import Camera, Pixels, is_seen, natural_aspect, render, render_all
 from ..texture_memory import texture_bytes
 from ..visual.heat_map import histogram
 from ..visual.worst import WorstPatch, patch_view, worst_patches
+from .kept import FRONT_VIEW, KINDS, LOSS, MESHES
 from .viewer.files import has_viewer_data
 
 PICTURES = "pictures"  # the folder beside the page
@@ -36,9 +37,6 @@ THUMBNAIL = 320  # pixels of its smaller copy, the longer side
 CLOSE_UP = 320  # pixels; width and height of a close-up
 CLOSE_UPS = 3  # worst patches that are shown
 CLOSE_UP_MARGIN = 1.2  # a close-up is so many patch diagonals wide
-MESHES = ("reference", "distorted")
-KINDS = (*MESHES, "heat")  # of the pictures of a view
-LOSS, FRONT_VIEW = "loss", "front"  # views
 
 
 def open_report_folder(folder: str) -> None:

@@ -12,7 +12,7 @@ from ..numbers import score_text
 from ..words import LABELS, LOD, ORIGINAL
 from .fragments import ramp, text, zoomed
 from .histogram import legend
-from .pictures import LOSS
+from .kept import LOSS
 
 Record = Mapping[str, Any]
 

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,15 +15,14 @@ from ....metric.evaluation import Result
 from ....metric.surface import Surface
 from ...atomic_files import write_text
 from ...render import AZIMUTH, ELEVATION
+from ..kept import VIEWER
 from .heat import heat_data
 from .mesh import mesh_data
 from .packing import script_text
 
-VIEWER = "viewer"  # the folder beside the page
 PROGRAMS = ("three.js", "viewer.js")
 _PARTS = ("shaders.js", "scene.js", "camera.js", "viewer.js")  # of viewer.js
 FRONT_RIGHT = (AZIMUTH, ELEVATION)
-_DATA = re.compile(rf"{VIEWER}/[A-Za-z0-9-]+\.js")
 
 
 @dataclass(frozen=True)
@@ -87,15 +85,6 @@ def write_pair_data(
 def has_viewer_data(folder: str, viewer: Mapping[str, Any] | None) -> bool:
     """Whether both files of a record's "viewer" are in a report's folder."""
     return viewer is not None and all(os.path.exists(os.path.join(folder, path)) for path in viewer.values())
-
-
-def is_viewer(value: object) -> bool:
-    """Whether a record's "viewer" is one: names that write_pair_data could have given."""
-    return (
-        isinstance(value, Mapping)
-        and value.keys() == {"reference", "level"}
-        and all(isinstance(path, str) and _DATA.fullmatch(path) for path in value.values())
-    )
 
 
 def write_programs(folder: str) -> None:
