@@ -66,7 +66,10 @@ def picture_of_report(out: Path, reference: Path) -> Path | None:
     script("score.py", *names, "--report", "report", "--attribution", folder=out)
     picture = out / "report.png"
     size = "{},{}".format(*REPORT_SIZE)
-    page = (out / "report" / "index.html").as_uri()
+    # The browser's picture does not wait for images that may come later.
+    still = (out / "report" / "index.html").read_text(encoding="utf-8")
+    page = out / "report" / "still.html"
+    page.write_text(still.replace(' loading="lazy" decoding="async"', ' decoding="sync"'), encoding="utf-8")
     run(
         *(
             browser,
@@ -76,7 +79,7 @@ def picture_of_report(out: Path, reference: Path) -> Path | None:
             "--hide-scrollbars",
             "--blink-settings=imagesEnabled=true",
         ),
-        *(f"--window-size={size}", "--virtual-time-budget=5000", f"--screenshot={picture}", page),
+        *(f"--window-size={size}", "--virtual-time-budget=5000", f"--screenshot={picture}", page.as_uri()),
     )
     whole = Image.open(picture).convert("RGB")
     whole.resize((WIDTH, round(whole.height * WIDTH / whole.width)), Image.Resampling.LANCZOS).save(picture)
