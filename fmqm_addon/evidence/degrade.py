@@ -7,7 +7,7 @@ import csv
 import io
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -20,8 +20,11 @@ from .distortions import DISTORTIONS, Distortion
 from .meshes import diagonal, rounded, shaken
 from .textures import png_bytes, worse_texture
 
-if TYPE_CHECKING:
-    import bpy
+# bpy.types of these names, which bpy has no stubs for; this room is imported without Blender.
+BlenderObject: TypeAlias = Any
+BlenderMesh: TypeAlias = Any
+BlenderImage: TypeAlias = Any
+UVLayer: TypeAlias = Any
 
 MANIFEST = "manifest.csv"
 COLUMNS = ("id", "reference", "distorted", "kind", "level")
@@ -88,7 +91,7 @@ def _check_place(path: str, folder: Path) -> None:
         raise FMQMError(f"{folder}: the model itself is there, and would be replaced; name another folder")
 
 
-def _opened(spec: str) -> list[bpy.types.Object]:
+def _opened(spec: str) -> list[BlenderObject]:
     """The model's objects as they are evaluated, each with a mesh of its own."""
     from ..blender.files.asset_path import split_spec
     from ..blender.files.export import open_asset
@@ -102,7 +105,7 @@ def _opened(spec: str) -> list[bpy.types.Object]:
     return objects
 
 
-def _write(objects: Sequence[bpy.types.Object], path: Path) -> None:
+def _write(objects: Sequence[BlenderObject], path: Path) -> None:
     from ..blender.files.export import EXPORTERS
     from ..blender.files.flatten import flatten_objects
 
@@ -115,7 +118,7 @@ def _write(objects: Sequence[bpy.types.Object], path: Path) -> None:
         raise FileError(f"{path}: cannot be written ({getattr(error, 'strerror', None) or error})") from error
 
 
-def _distort(objects: Sequence[bpy.types.Object], distortion: Distortion, rng: np.random.Generator) -> None:
+def _distort(objects: Sequence[BlenderObject], distortion: Distortion, rng: np.random.Generator) -> None:
     from ..blender.scene.decimate import add_modifiers
 
     if distortion.kept < 1:
@@ -140,7 +143,7 @@ def _distort(objects: Sequence[bpy.types.Object], distortion: Distortion, rng: n
             _replace_texture(image, distortion)
 
 
-def _apply_modifiers(objects: Iterable[bpy.types.Object]) -> None:
+def _apply_modifiers(objects: Iterable[BlenderObject]) -> None:
     import bpy
 
     graph = bpy.context.evaluated_depsgraph_get()
@@ -151,7 +154,7 @@ def _apply_modifiers(objects: Iterable[bpy.types.Object]) -> None:
         each.data = mesh
 
 
-def _split_at_seams(mesh: bpy.types.Mesh) -> None:
+def _split_at_seams(mesh: BlenderMesh) -> None:
     """Cuts a mesh open where its texture coordinates jump: decimation keeps borders nearly where they are."""
     import bmesh
 
@@ -181,7 +184,7 @@ def _is_seam(one: Any, other: Any, layer: Any) -> bool:
     return any(ends[each.vert] != each[layer].uv for each in (other, other.link_loop_next))
 
 
-def _world_positions(objects: Sequence[bpy.types.Object]) -> tuple[Floats, list[slice]]:
+def _world_positions(objects: Sequence[BlenderObject]) -> tuple[Floats, list[slice]]:
     """(N, 3) float64 of all vertices, and where those of each object are."""
     from ..blender import arrays
 
@@ -195,7 +198,7 @@ def _world_positions(objects: Sequence[bpy.types.Object]) -> tuple[Floats, list[
     return np.concatenate(parts), places
 
 
-def _move_vertices(objects: Sequence[bpy.types.Object], positions: Floats, places: Sequence[slice]) -> None:
+def _move_vertices(objects: Sequence[BlenderObject], positions: Floats, places: Sequence[slice]) -> None:
     from ..blender import arrays
 
     for each, place in zip(objects, places, strict=True):
@@ -205,7 +208,7 @@ def _move_vertices(objects: Sequence[bpy.types.Object], positions: Floats, place
         each.data.update()
 
 
-def _round_coordinates(objects: Sequence[bpy.types.Object], bits: int) -> None:
+def _round_coordinates(objects: Sequence[BlenderObject], bits: int) -> None:
     """Each mesh's own, over the box around them."""
     from ..blender import arrays
 
@@ -214,18 +217,18 @@ def _round_coordinates(objects: Sequence[bpy.types.Object], bits: int) -> None:
         arrays.write(layer.uv, "vector", rounded(own, bits).astype(np.float32))
 
 
-def _layers(objects: Sequence[bpy.types.Object]) -> Iterator[bpy.types.MeshUVLoopLayer]:
+def _layers(objects: Sequence[BlenderObject]) -> Iterator[UVLayer]:
     for each in objects:
         yield from each.data.uv_layers
 
 
-def _textures(objects: Sequence[bpy.types.Object]) -> list[bpy.types.Image]:
+def _textures(objects: Sequence[BlenderObject]) -> list[BlenderImage]:
     from ..blender.materials.color_images import color_images
 
     return color_images(list(objects))
 
 
-def _replace_texture(image: bpy.types.Image, distortion: Distortion) -> None:
+def _replace_texture(image: BlenderImage, distortion: Distortion) -> None:
     """By a PNG of what a decoder gives back, which everybody reads alike."""
     import bpy
 
