@@ -159,7 +159,6 @@ class Evaluation:
         fields = evaluate_fields(distorted, samples.positions, prepared.order)
         dist = yield from as_part(fields, 0.0, 0.8, "fields")
         weights = channel_weights(settings.color_space)
-        channels_r, channels_d = (channels(field.ncf, settings.color_space) for field in (prepared.ref, dist))
         diagonals = np.array([patch.diagonal for patch in prepared.patches])
         features = np.empty((len(prepared.patches), 4))
         perceived = np.empty((len(prepared.patches), len(PERCEIVED_COLUMNS)))
@@ -176,7 +175,9 @@ class Evaluation:
             pairs = near
             if settings.radius != RADIUS:
                 pairs = pairs_of_patches(positions, start, units, settings.radius)
-            ref, other = replace(ref, channels=channels_r[here]), replace(other, channels=channels_d[here])
+            ref, other = (
+                replace(field, channels=channels(field.channels, settings.color_space)) for field in (ref, other)
+            )
             features[group] = features_of_patches(positions, start, ref, other, units, pairs, weights, settings)
             yield Progress("features", 0.8 + 0.2 * min(first + _PATCHES_AT_ONCE, len(features)) / len(features))
         patch_scores = np.column_stack([features, pool_features(features, settings.pooling)])

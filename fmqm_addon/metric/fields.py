@@ -75,6 +75,7 @@ def evaluate_fields(surface: Surface, points: Floats, order: Ints, reach: Floats
         counting = crossing_counts(surface, points.take(asked, axis=0), directions, closed)
         crossings = yield from as_part(counting, 0.55, 0.45)
         sdf[off_surface[(crossings % 2 == 1).take(as_asked)]] *= -1
+    yield Progress("", 1.0)  # what follows is a step of its own: random access to all rows
     back = np.empty_like(order)
     back[order] = np.arange(len(order))
     return Fields(nearest.take(back, axis=0), triangle.take(back), sdf.take(back), ncf.take(back, axis=0))

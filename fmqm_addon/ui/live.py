@@ -161,9 +161,8 @@ class Live:
         return options, Reading(bake=0, include=patterns[0], exclude=patterns[1])
 
     def _slice(self, work: Stepper[PairReading]) -> None:
-        began = time.perf_counter()
-        more = True
-        while more and time.perf_counter() - began < SLICE:
+        began, more = time.perf_counter(), True
+        while more:
             before = time.thread_time()
             try:
                 more = work.step()
@@ -175,6 +174,8 @@ class Live:
                 self.is_too_slow = True
                 work.cancel()
                 return
+            if time.perf_counter() - began >= SLICE:
+                break
         if not more:
             self.reading, self._work = work.result, None
 
