@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures of what was compared, drawn by casting camera rays through the surfaces' own spatial queries.
+"""Pictures of what was compared, drawn by a depth buffer.
 
 A pixel's color comes from the same lookup as the color field (NCF), times a headlight's shade by smooth normals, as
 games show meshes. No renderer and no graphics card take part.
@@ -8,11 +8,12 @@ games show meshes. No renderer and no graphics card take part.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..comparison.depth_buffer import DEEPEST, NOTHING, Screen, on_screen
 from ..comparison.normals import corner_normals
 from ..metric.errors import FMQMError
 from ..metric.geometry import Floats, Ints, cross, dot
@@ -34,10 +35,10 @@ ASPECTS = (0.7, 1.4)  # panels are as high as this many widths at least and at m
 
 AMBIENT, SCORE_AMBIENT = 0.5, 0.65  # shade of a face edge-on; colors that mean numbers are shaded less
 LIGHT = (-0.45, 0.55, 1.0)  # direction to the headlight: right, up, towards the camera
-CONTRAST = 0.16  # pixels that differ this much from a neighbor get more rays
-MORE_RAYS = np.array([(-1, -3), (3, -1), (1, 3), (-3, 1)]) / 8  # a turned square: no two in a row or column
-BATCH = 1 << 13  # rays of a step: few enough for a processor's cache
-TILE = 8  # pixels; width and height of what is left out where nothing can be seen
+CONTRAST = 0.16  # pixels that differ this much from a neighbor are looked at in more places
+MORE_PLACES = ((3 / 8, 1 / 8), (7 / 8, 3 / 8), (5 / 8, 7 / 8), (1 / 8, 5 / 8))  # no two in a row or column of a pixel
+BATCH = 1 << 13  # places of a step: few enough for a processor's cache
+NEAREST = 1e-3  # diagonals of the reference; what is nearer to the eye is seen by no camera
 HIDDEN_BEHIND = 0.01  # of the frame: what lies this much deeper than what is seen is hidden
 
 
@@ -151,7 +152,7 @@ def render(
         normals: what corner_normals() says of the surface, to save smoothing them again; None: smoothed where seen.
 
     Returns:
-        (height, width, 3) uint8. One ray a pixel, and more where neighbors differ.
+        (height, width, 3) uint8. One look a pixel, and more where neighbors differ.
     """
     return render_all(surface, camera, size, (paint,), normals)[0]
 
@@ -163,7 +164,7 @@ def render_all(
     paints: Sequence[Paint | None],
     normals: Floats | None = None,
 ) -> list[Pixels]:
-    """As render(), once for each of the paints; the rays are cast once for all."""
+    """As render(), once for each of the paints; what is seen where is found once for all."""
     return finish(rendering(surface, camera, size, paints, normals))
 
 
@@ -175,48 +176,80 @@ def rendering(
     normals: Floats | None = None,
 ) -> Work[list[Pixels]]:
     """render_all() in steps of some milliseconds."""
-    columns, rows = _pixel_centers(size)
+    screen = yield from as_part(_projecting(surface, camera, size), 0.0, 0.1)
+    shown = yield from as_part(screen.showing(), 0.1, 0.1)
+    covered = np.flatnonzero(shown != NOTHING)
+    rows, columns = np.divmod(covered, size[0])
     images = [np.full((size[0] * size[1], 3), np.array(BACKGROUND) / 255) for _ in paints]
-    near = _near_silhouette(surface, camera, size)
-    casting = _casting(surface, camera, size, columns[near], rows[near], paints, normals)
-    for image, colors in zip(images, (yield from as_part(casting, 0.0, 0.6)), strict=True):
-        image[near] = colors
+    shading = _shading(surface, camera, size, columns + 0.5, rows + 0.5, shown[covered], paints, normals)
+    for image, colors in zip(images, (yield from as_part(shading, 0.2, 0.4)), strict=True):
+        image[covered] = colors
     rough = [_differs(image.reshape(size[1], size[0], 3)).ravel() for image in images]
     again = np.flatnonzero(np.any(rough, axis=0))
-    across, down = MORE_RAYS.T
-    columns, rows = (columns[again, None] + across).ravel(), (rows[again, None] + down).ravel()
-    casting = _casting(surface, camera, size, columns, rows, paints, normals)
-    for image, here, colors in zip(images, rough, (yield from as_part(casting, 0.6, 0.4)), strict=True):
-        image[here] = colors.reshape(len(again), len(MORE_RAYS), 3).mean(axis=1)[here[again]]
+    shown = np.empty((len(again), len(MORE_PLACES)), np.int64)
+    for number, place in enumerate(MORE_PLACES):
+        shown[:, number] = yield from as_part(screen.showing(again, place), 0.6 + 0.02 * number, 0.02)
+    which, corner = np.nonzero(shown != NOTHING)
+    rows, columns = np.divmod(again[which], size[0])
+    across, down = np.array(MORE_PLACES)[corner].T
+    shading = _shading(surface, camera, size, columns + across, rows + down, shown[which, corner], paints, normals)
+    for image, here, colors in zip(images, rough, (yield from as_part(shading, 0.7, 0.3)), strict=True):
+        fine = np.full((*shown.shape, 3), np.array(BACKGROUND) / 255)
+        fine[which, corner] = colors
+        image[here] = fine.mean(axis=1)[here[again]]
     return [(image.reshape(size[1], size[0], 3) * 255 + 0.5).astype(np.uint8) for image in images]
 
 
-def _near_silhouette(surface: Surface, camera: Camera, size: tuple[int, int]) -> Ints:
-    """The pixels, row after row, in tiles that triangles touch with their boxes; no other can show any of them."""
-    local = (surface.vertices - camera.eye) @ camera.axes.T
-    if local[:, 2].min() <= 0:  # what is beside the eye may be seen anywhere
-        return np.arange(size[0] * size[1])
-    tiles = [-(-side // TILE) for side in size]
-    shares = [(1 + sign * local[:, k] / local[:, 2] / camera.half[k]) / 2 for k, sign in ((0, 1), (1, -1))]
-    places = [
-        np.clip(share * side / TILE, -1, count).astype(np.int64)
-        for share, side, count in zip(shares, size, tiles, strict=True)
+def _projecting(surface: Surface, camera: Camera, size: tuple[int, int]) -> Work[Screen]:
+    """The triangles as they lie on the camera's image."""
+    nearest = max(camera.near, NEAREST)
+    local, triangles, source = _clipped((surface.vertices - camera.eye) @ camera.axes.T, surface.triangles, nearest)
+    yield Progress("", 0.2)
+    depth = np.maximum(local[:, 2], nearest)
+    x = (1 + local[:, 0] / depth / camera.half[0]) / 2 * size[0]
+    y = (1 - local[:, 1] / depth / camera.half[1]) / 2 * size[1]
+    near = 1 / depth  # is linear on the image, which depth is not
+    low, high = float(near.min()), float(near.max())
+    near = (near - (low + high) / 2) * (2 * DEEPEST / max(high - low, float(np.finfo(np.float64).tiny)))
+    screen = yield from as_part(on_screen(x, y, near, triangles, size), 0.2, 0.8)
+    return screen if source is None else replace(screen, names=source[screen.names])
+
+
+def _clipped(local: Floats, triangles: Ints, nearest: float) -> tuple[Floats, Ints, Ints | None]:
+    """What of the triangles lies before a camera, at a depth or deeper.
+
+    Args:
+        local: (V, 3) right, up and forward of the camera.
+
+    Returns:
+        Vertices, the first of them as they were; triangles; and which each is a part of, None where all are whole.
+    """
+    behind = local[:, 2] < nearest
+    if not behind.any():
+        return local, triangles, None
+    hidden = behind[triangles]
+    count = np.count_nonzero(hidden, axis=1)
+    whole, cut = np.flatnonzero(count == 0), np.flatnonzero((count == 1) | (count == 2))
+    # Turned so that the first corner is alone on its side.
+    alone = hidden[cut] == (count[cut] == 1)[:, None]
+    turned = (alone.argmax(axis=1)[:, None] + np.arange(3)) % 3
+    a, b, c = np.take_along_axis(triangles[cut], turned, axis=1).T
+    ends = []
+    for other in (b, c):
+        # From the end that is hidden, whichever triangle asks: both of an edge must get the same.
+        start, end = (local[np.where(behind[a] == first, a, other)] for first in (True, False))
+        share = (nearest - start[:, 2]) / (end[:, 2] - start[:, 2])
+        ends.append(start + share[:, None] * (end - start))
+    p = len(local) + np.arange(len(cut))
+    q = p + len(cut)
+    one, two = np.flatnonzero(~behind[a]), np.flatnonzero(behind[a])
+    parts = [
+        np.stack([a[one], p[one], q[one]], axis=1),
+        np.stack([p[two], b[two], c[two]], axis=1),
+        np.stack([p[two], c[two], q[two]], axis=1),
     ]
-    corners = [place[surface.triangles] for place in places]
-    (left, top), (right, bottom) = ([of(place, axis=1).clip(0) for place in corners] for of in (np.min, np.max))
-    # Each box is counted at its corners; sums along both axes count it everywhere within.
-    width = tiles[0] + 2
-    counts = np.zeros((tiles[1] + 2) * width, np.int64)
-    for row, column, sign in ((top, left, 1), (top, right + 1, -1), (bottom + 1, left, -1), (bottom + 1, right + 1, 1)):
-        counts += sign * np.bincount(row * width + column, minlength=len(counts))
-    touched = counts.reshape(-1, width).cumsum(axis=0).cumsum(axis=1)[: tiles[1], : tiles[0]] > 0
-    return np.flatnonzero(touched.repeat(TILE, axis=0).repeat(TILE, axis=1)[: size[1], : size[0]])
-
-
-def _pixel_centers(size: tuple[int, int]) -> tuple[Floats, Floats]:
-    """(N,) columns and rows, in pixels from the left and the top."""
-    columns, rows = np.meshgrid(np.arange(size[0]) + 0.5, np.arange(size[1]) + 0.5)
-    return columns.ravel(), rows.ravel()
+    source = np.concatenate([whole, cut[one], cut[two], cut[two]])
+    return np.concatenate([local, *ends]), np.concatenate([triangles[whole], *parts]), source
 
 
 def is_seen(surface: Surface, camera: Camera, point: Floats) -> bool:
@@ -227,33 +260,37 @@ def is_seen(surface: Surface, camera: Camera, point: Floats) -> bool:
     return bool(hit[0] > distance - HIDDEN_BEHIND)
 
 
-def _casting(
+def _shading(
     surface: Surface,
     camera: Camera,
     size: tuple[int, int],
     columns: Floats,
     rows: Floats,
+    triangle: Ints,
     paints: Sequence[Paint | None],
     normals: Floats | None,
 ) -> Work[list[Floats]]:
-    """(N, 3) encoded colors in [0, 1], for each of the paints, of rays through places of the image, in pixels."""
+    """(N, 3) encoded colors in [0, 1], for each of the paints, of the triangles at places of the image, in pixels."""
     images = [np.empty((len(columns), 3)) for _ in paints]
     for first in range(0, len(columns), BATCH):
         here = slice(first, first + BATCH)
         directions = camera.directions(2 * columns[here] / size[0] - 1, 1 - 2 * rows[here] / size[1])
-        for image, colors in zip(images, _ray_colors(surface, camera, directions, paints, normals), strict=True):
+        shaded = _shaded(surface, camera, directions, triangle[here], paints, normals)
+        for image, colors in zip(images, shaded, strict=True):
             image[here] = colors
         yield Progress("", min(here.stop / len(columns), 1.0))
     return images
 
 
-def _ray_colors(
-    surface: Surface, camera: Camera, directions: Floats, paints: Sequence[Paint | None], normals: Floats | None
+def _shaded(
+    surface: Surface,
+    camera: Camera,
+    directions: Floats,
+    triangle: Ints,
+    paints: Sequence[Paint | None],
+    normals: Floats | None,
 ) -> Iterator[Floats]:
-    """(N, 3) encoded colors in [0, 1] of (N, 3) rays from the camera, once for each of the paints."""
-    triangle, _ = surface.query.first_hit(camera.eye + camera.near * directions, directions)
-    count, hit = len(triangle), np.flatnonzero(triangle >= 0)
-    directions, triangle = directions[hit], triangle[hit]
+    """(N, 3) encoded colors in [0, 1] of (N,) triangles in (N, 3) directions from the camera, for each paint."""
     # What is the same for all of a triangle's pixels is computed once.
     seen = np.zeros(len(surface.triangles), bool)
     seen[triangle] = True
@@ -276,15 +313,11 @@ def _ray_colors(
     length = np.linalg.norm(light) * np.sqrt(np.maximum(dot(smooth, smooth), np.finfo(np.float64).tiny))
     lit = np.maximum(smooth @ light / length, 0)[:, None]
     for paint in paints:
-        colors = np.full((count, 3), np.array(BACKGROUND) / 255)
-        if not len(hit):
-            pass
-        elif paint is None:
-            colors[hit] = np.clip(surface.color_at(triangle, barycentric), 0, 1) * (AMBIENT + (1 - AMBIENT) * lit)
+        if paint is None:
+            yield np.clip(surface.color_at(triangle, barycentric), 0, 1) * (AMBIENT + (1 - AMBIENT) * lit)
         else:
             points = camera.eye + np.einsum("nk,nkc->nc", barycentric, np.stack([a, b, c], axis=1)[row])
-            colors[hit] = paint(triangle, points, barycentric) * (SCORE_AMBIENT + (1 - SCORE_AMBIENT) * lit)
-        yield colors
+            yield paint(triangle, points, barycentric) * (SCORE_AMBIENT + (1 - SCORE_AMBIENT) * lit)
 
 
 def _differs(image: Floats) -> NDArray[np.bool_]:

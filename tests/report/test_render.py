@@ -17,7 +17,7 @@ from fmqm_addon.metric.colorspace import srgb_to_lab
 from fmqm_addon.metric.errors import FileError, FMQMError
 from fmqm_addon.metric.evaluation import COLUMNS, Evaluation, Result
 from fmqm_addon.metric.settings import Settings
-from fmqm_addon.metric.stepper import Stepper
+from fmqm_addon.metric.stepper import Stepper, finish
 from fmqm_addon.metric.surface import Frame, MeshArrays, Surface, prepare_surface
 from fmqm_addon.metric.texture import Material, PlainColor, Texture
 from fmqm_addon.report import render as rendering
@@ -117,14 +117,25 @@ def test_camera_holds_every_vertex_and_wastes_nothing() -> None:
     assert camera.axes[1, 2] > 0.9  # Z is up
 
 
-def test_what_is_left_out_around_the_silhouette_shows_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Against every pixel's own ray, for a shape that leaves much of the image free."""
-    each = surface(sphere(), (texture(),))
-    camera = Camera.framing(each, wall(1, each.frame, width=6.0))
-    drawn = render(each, camera, (90, 70))
-    assert (drawn == rendering.BACKGROUND).all(axis=2).mean() > 0.5
-    monkeypatch.setattr(rendering, "_near_silhouette", lambda *_: np.arange(90 * 70))
-    assert np.array_equal(render(each, camera, (90, 70)), drawn)
+@pytest.mark.parametrize("near", [None, 1.2, 0.0])
+def test_pixels_show_what_rays_hit(near: float | None) -> None:
+    """Triangles that cross each other, from outside, cut in the middle, and with the eye among them; some pixels alone
+    as all of them."""
+    random, size = np.random.default_rng(3), (90, 70)
+    mixed = surface((random.normal(size=(120, 3)), np.arange(120).reshape(-1, 3)), (PlainColor((1, 1, 1)),))
+    camera = Camera.framing(mixed)
+    if near is not None:
+        back = 1.3 if near else 0.0
+        camera = Camera(-back * camera.axes[2], camera.axes, (0.4, 0.3), near)
+    columns, rows = (grid.ravel() + 0.5 for grid in np.meshgrid(np.arange(size[0]), np.arange(size[1])))
+    directions = camera.directions(2 * columns / size[0] - 1, 1 - 2 * rows / size[1])
+    begin = max(camera.near, rendering.NEAREST) / (directions @ camera.axes[2])
+    hit, _ = mixed.query.first_hit(camera.eye + begin[:, None] * directions, directions)
+    screen = finish(rendering._projecting(mixed, camera, size))
+    shown = finish(screen.showing())
+    assert np.mean(shown != hit) < 0.002 and 0.05 < np.mean(shown >= 0) and len(np.unique(shown)) >= 5
+    some = np.flatnonzero(random.random(shown.size) < 0.3)
+    assert np.array_equal(finish(screen.showing(some)), shown[some])
 
 
 def test_places_have_the_color_of_the_nearest_patch_between_fitted_ends() -> None:

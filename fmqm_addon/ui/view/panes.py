@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The loupe's three pictures: Original, LOD and heat map from one camera, by the rays that the report is drawn with."""
+"""The loupe's three pictures: Original, LOD and heat map from one camera, as the report is drawn."""
 
 from __future__ import annotations
 
