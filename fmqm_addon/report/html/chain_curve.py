@@ -14,7 +14,8 @@ from ..numbers import score_text
 WIDTH, HEIGHT = 460, 270
 LEFT, RIGHT, TOP, BOTTOM = 44, 16, 28, 62  # margins; the lowest level's name stands above the axis' numbers
 LABEL = 22  # characters of a level's name
-LETTER, LINE = 7, 13  # about the size of a letter of a level's name
+LETTER, LINE = 8, 15  # about the size of a letter of a level's name
+MARK = 5  # radius of a mark
 TICKS = 3  # marks of an axis at least, where there are so many round numbers
 
 
@@ -65,24 +66,44 @@ def curve_svg(levels: Sequence[Level], cost: str, of: str) -> str:
     if len({level.cost for level in levels}) == len(levels):  # others are no chain
         points = " ".join(f"{x(level.cost):.1f},{y(level.score):.1f}" for level in ordered)
         parts.append(f'<polyline class="line" points="{points}"/>')
-    written: list[tuple[float, float, float]] = []  # left and right end, and height, of the names so far
-    for level in ordered:
-        # Below to the right, or above to the left: there the curve, which rises, is not.
-        on_left = x(level.cost) < (LEFT + WIDTH - RIGHT) / 2
-        shift, drop, anchor = (8, 17, "start") if on_left else (-7, -8, "end")
+    marks = [(x(level.cost), y(level.score)) for level in ordered]
+    taken = [(at - MARK, at + MARK, height - MARK, height + MARK) for at, height in marks]
+    for level, (at, height) in zip(ordered, marks, strict=True):
         kind = ' class="reference"' if level.is_reference else ""
         parts.append(
-            f'<circle{kind} cx="{x(level.cost):.1f}" cy="{y(level.score):.1f}" r="5">'
+            f'<circle{kind} cx="{at:.1f}" cy="{height:.1f}" r="{MARK}">'
             f"<title>{escape(level.name)}: {score_text(level.score)}</title></circle>"
         )
         name = shorten(level.name, lambda text: len(text) <= LABEL)
-        at, height = x(level.cost) + shift, y(level.score) + drop
-        left, right = (at, at + LETTER * len(name)) if on_left else (at - LETTER * len(name), at)
-        if any(left < end and begin < right and abs(height - other) < LINE for begin, end, other in written):
-            continue  # it is told where one points at the mark
-        written.append((left, right, height))
-        parts.append(f'<text class="level" x="{at:.1f}" y="{height:.1f}" text-anchor="{anchor}">{escape(name)}</text>')
+        for box, baseline, anchor in _places(at, height, LETTER * len(name)):
+            left, right, top, bottom = box
+            if (
+                0 <= left
+                and right <= WIDTH
+                and not any(
+                    left < other[1] and other[0] < right and top < other[3] and other[2] < bottom for other in taken
+                )
+            ):
+                taken.append(box)
+                end = left if anchor == "start" else right
+                parts.append(
+                    f'<text class="level" x="{end:.1f}" y="{baseline:.1f}" text-anchor="{anchor}">{escape(name)}</text>'
+                )
+                break  # else it is told where one points at the mark
     return "".join(parts) + "</svg>"
+
+
+def _places(x: float, y: float, width: float) -> list[tuple[tuple[float, float, float, float], float, str]]:
+    """Where the name of a mark may stand: its left, right, top and bottom, its baseline and its anchor.
+
+    Below to the right, or above to the left: there the curve, which rises, is not.
+    """
+    right, left = x + 8, x - 7
+    places = [
+        ((right, right + width, y + 17 - LINE + 3, y + 17 + 3), y + 17, "start"),
+        ((left - width, left, y - 8 - LINE + 3, y - 8 + 3), y - 8, "end"),
+    ]
+    return places if x < (LEFT + WIDTH - RIGHT) / 2 else places[::-1]
 
 
 def _ticks(low: float, high: float) -> list[float]:

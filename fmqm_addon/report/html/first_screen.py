@@ -13,7 +13,7 @@ from ..numbers import score_text
 from ..visual.colormap import score_colors
 from ..words import LABELS, LOD
 from .chain_curve import Level, curve_svg
-from .fragments import bar, count_text, css, image, text
+from .fragments import bar, count_text, css, image, name_text, text
 from .overview import LEVELS, Chain, Line, Overview
 
 SORTS = {
@@ -28,7 +28,7 @@ FLAGS = {"low": "Below Threshold", "warned": "With Warnings", "failed": "Not Sco
 def masthead(overview: Overview) -> str:
     """The title, and the run in a sentence or two."""
     lines, chains = overview.lines, overview.chains
-    of = text(chains[0].name) if len(chains) == 1 else count_text(len(chains), "original")
+    of = name_text(chains[0].name) if len(chains) == 1 else count_text(len(chains), "original")
     scored = [line for line in lines if line.score is not None]
     said = []
     if scored:
@@ -59,7 +59,7 @@ def look_first(overview: Overview) -> str:
         return '<p class="note">Nothing stands out: no LOD can be told from its original.</p>\n'
     items = "".join(
         f'<li><a href="#pair-{line.number}" title="{escape(line.paths)}">{_thumbnail(line, "heat")}'
-        f"<span><b>{text(line.name)}</b><span>{text(line.reason)}</span></span></a></li>"
+        f"<span><b>{name_text(line.name)}</b><span>{text(line.reason)}</span></span></a></li>"
         for line in first
     )
     return (
@@ -128,10 +128,11 @@ def chains(overview: Overview) -> Iterator[str]:
 
 def _chain(number: int, chain: Chain, overview: Overview) -> str:
     tiles = "".join(_tile(line, chain, overview) for line in chain.lines)
-    picture = f'<div class="thumb">{image(chain.thumbnail, "")}</div>' if chain.thumbnail else ""
+    picture = image(chain.thumbnail, "") if chain.thumbnail else '<span class="none">no picture</span>'
+    costs = _costs(chain.triangles, None, chain.texture_mb, chain.texture_side)
     original = (
-        f'<div class="original" title="{escape(chain.path)}">{picture}<h2 id="chain-{number}">{text(chain.name)}</h2>'
-        f'<p class="faint">Original<br>{_costs(chain.triangles, None, chain.texture_mb, chain.texture_side)}</p></div>'
+        f'<div class="original" title="{escape(chain.path)}"><div class="thumb">{picture}</div>'
+        f'<h2 id="chain-{number}">{name_text(chain.name)}</h2><p class="faint">Original<br>{costs}</p></div>'
     )
     curves = _curves(chain, overview)
     return (
@@ -141,7 +142,7 @@ def _chain(number: int, chain: Chain, overview: Overview) -> str:
 
 
 def _tile(line: Line, chain: Chain, overview: Overview) -> str:
-    name = f'<span class="name">{text(line.name)}</span>'
+    name = f'<span class="name">{name_text(line.name)}</span>'
     kinds = {"distorted": "of-lod", "heat": "of-heat", "reference": "of-original"}
     pictures = "".join(_thumbnail(line, kind, shown) for kind, shown in kinds.items())
     link = (
@@ -174,7 +175,7 @@ def level_mark(level: str | None) -> str:
 
 
 def _costs(triangles: int | None, whole: int | None, megabytes: float | None, side: int) -> str:
-    share = f" ({100 * triangles / whole:.3g} %)" if triangles is not None and whole else ""
+    share = f" ({100 * triangles / whole:.3g}\u00a0%)" if triangles is not None and whole else ""
     lines = [] if triangles is None else [f"{triangles:,} triangles{share}"]
     if megabytes:
         pixels = f"{side:,} px, " if side else ""
@@ -220,4 +221,4 @@ def _thumbnail(line: Line, kind: str, name: str = "") -> str:
 
 
 def _link(line: Line) -> str:
-    return f'<a href="#pair-{line.number}" title="{escape(line.paths)}">{text(line.name)}</a>'
+    return f'<a href="#pair-{line.number}" title="{escape(line.paths)}">{name_text(line.name)}</a>'

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from html import escape
 from urllib.parse import quote
 
@@ -13,6 +14,7 @@ from ..visual.colormap import score_colors
 
 MEGABYTE = 2**20
 _STOPS = 9  # colors of a ramp
+_JOINTS, _BREAK = re.compile(r"[_/\\-]+(?=.)"), r"\g<0><wbr>"
 
 
 def bar(value: float | None) -> str:
@@ -26,6 +28,11 @@ def bar(value: float | None) -> str:
 def text(text: object) -> str:
     """Text from anywhere as HTML; it cannot turn the direction of what stands around it."""
     return f"<bdi>{escape(str(text))}</bdi>"
+
+
+def name_text(name: str) -> str:
+    """A name as HTML, as text() has it, that may go on in a new line behind what joins its parts."""
+    return f"<bdi>{_JOINTS.sub(_BREAK, escape(name))}</bdi>"
 
 
 def css(color: Floats) -> str:

@@ -16,6 +16,7 @@ from .fragments import css
 
 WIDTH, HEIGHT = 460, 170
 LEFT, RIGHT, TOP, BOTTOM = 10, 10, 22, 26  # margins
+LETTER, NARROW = 0.021, 0.042  # width of a tick's letter, in the drawing's and in a narrow legend's
 
 
 def histogram_svg(counts: Sequence[int], low: float, high: float, mean: float, label: str) -> str:
@@ -42,7 +43,7 @@ def histogram_svg(counts: Sequence[int], low: float, high: float, mean: float, l
     def x(value: float) -> float:
         return LEFT + (WIDTH - LEFT - RIGHT) * min(max((value - low) / (high - low), 0.0), 1.0)
 
-    for place, tick in _ticks(low, high):
+    for place, tick in _ticks(low, high, LETTER):
         anchor = "start" if place < 0.02 else "end" if place > 0.98 else "middle"
         parts.append(
             f'<text x="{x(low + place * (high - low)):.1f}" y="{HEIGHT - 8}" text-anchor="{anchor}">{tick}</text>'
@@ -57,20 +58,33 @@ def histogram_svg(counts: Sequence[int], low: float, high: float, mean: float, l
     return "".join(parts) + "</svg>"
 
 
-def _ticks(low: float, high: float) -> list[tuple[float, str]]:
-    """Places in [0, 1] and texts of round numbers."""
+def _ticks(low: float, high: float, letter: float) -> list[tuple[float, str]]:
+    """Places in [0, 1] and texts of round numbers, whose letters are so wide."""
     numbers = round_ticks(low, high)
     write = number_text(numbers[1] - numbers[0] if len(numbers) > 1 else high - low)
     # What is lower than the lower end has its color, and its bar.
-    return [
+    ticks = [
         ((number - low) / (high - low), f"≤ {write(number)}" if number == low > 0 else write(number))
         for number in numbers
     ]
+    # Both ends stand, and between them what runs into neither.
+    reach = [_extent(place, letter * len(text)) for place, text in ticks]
+    kept = [
+        (reach[0][1] < left and right < reach[-1][0]) or k in (0, len(ticks) - 1)
+        for k, (left, right) in enumerate(reach)
+    ]
+    return [tick for tick, is_kept in zip(ticks, kept, strict=True) if is_kept]
+
+
+def _extent(place: float, width: float) -> tuple[float, float]:
+    """From where to where a tick reaches; at an end it reaches inwards."""
+    left = place if place < 0.02 else 1 - width if place > 0.98 else place - width / 2
+    return left, left + width
 
 
 def legend(low: float, high: float, label: str, ramp: str, has_gaps: bool) -> str:
     """The colors of a heat map, with the scores at round places."""
-    ticks = "".join(f'<span style="left:{100 * place:.1f}%">{tick}</span>' for place, tick in _ticks(low, high))
+    ticks = "".join(f'<span style="left:{100 * place:.1f}%">{tick}</span>' for place, tick in _ticks(low, high, NARROW))
     gap = '<span class="gap">pale: not measured</span>' if has_gaps else ""
     return (
         f'<span class="legend"><span>{label}</span><span class="scale">{ramp}'

@@ -100,9 +100,11 @@ class Overview:
 
     @property
     def first(self) -> list[Line]:
-        """What should be looked at first."""
+        """What should be looked at first; one stands for all that were not scored, where others stand out, too."""
         found = sorted((line for line in self.lines if line.reason), key=lambda line: line.urgency)
-        return found[:FIRST]
+        failed = [line for line in found if line.error is not None]
+        scored = found[len(failed) :]
+        return (failed[: max(FIRST - len(scored), 1)] + scored)[:FIRST]
 
     def short(self, record: Record) -> dict[str, Any]:
         """A record with short names, for words about it."""

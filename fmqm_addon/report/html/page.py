@@ -107,7 +107,8 @@ def _value(value: Any) -> str:
 
 
 def _settings(settings: Mapping[str, Any], versions: Mapping[str, str]) -> str:
-    rows = "".join(f"<div><dt>{_words(name)}</dt><dd>{_value(value)}</dd></div>" for name, value in settings.items())
+    shown = {**settings, "scored_patches": settings.get("scored_patches") or "all"}
+    rows = "".join(f"<div><dt>{_words(name)}</dt><dd>{_value(value)}</dd></div>" for name, value in shown.items())
     made = ", ".join(f"{_words(name)} {text(value)}" for name, value in versions.items())
     return (
         f'<section><h2>Settings</h2><dl class="card settings">{rows}</dl><p class="note">{made}. Texture MB: '

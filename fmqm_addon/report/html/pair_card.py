@@ -16,7 +16,7 @@ from ..records import PERCEIVED, SHOWN, shown_score, value_of
 from ..trust_table import Report, trust_lines
 from ..words import LABELS, LOD, ORIGINAL
 from .first_screen import level_mark
-from .fragments import MEGABYTE, bar, folded, scrolled, text
+from .fragments import MEGABYTE, bar, folded, name_text, scrolled, text
 from .histogram import histogram_svg
 from .overview import Overview
 from .size_curve import size_panel
@@ -76,10 +76,10 @@ def _head(number: int, record: Record, name: str, reference: str) -> str:
         for column in ("FMQM", "perceived")
         if value_of(record, column) is not None
     )
-    against = f'<p class="faint">against <span title="{escape(record["reference"])}">{text(reference)}</span></p>'
+    against = f'<p class="faint">against <span title="{escape(record["reference"])}">{name_text(reference)}</span></p>'
     return (
         f'<div class="title"><div><h3 id="name-{number}" tabindex="-1" title="{escape(record["distorted"])}">'
-        f'{text(name)}</h3>{against}<p class="words-level">{level_mark(record["impairment"])}</p></div>'
+        f'{name_text(name)}</h3>{against}<p class="words-level">{level_mark(record["impairment"])}</p></div>'
         f'<dl class="scores-big">{big}</dl>'
         '<button type="button" class="close" aria-label="Close" title="Close">×</button></div>'
     )

@@ -11,7 +11,7 @@ from ..numbers import MISSING
 from ..records import TABLE, shown_score, value_of
 from ..words import LABELS
 from .first_screen import flags_of, level_mark
-from .fragments import bar, text
+from .fragments import bar, name_text, text
 from .overview import LEVELS, Line, Overview, base_name
 
 # Columns by the key that they are sorted by.
@@ -34,14 +34,14 @@ def table(records: Iterable[Mapping[str, Any]], overview: Overview) -> Iterator[
 
 
 def _row(record: Mapping[str, Any], line: Line) -> str:
-    note = f'<span class="faint">of {text(base_name(line.reference))}</span>'
+    note = f'<span class="faint">of {name_text(base_name(line.reference))}</span>'
     if line.error is not None:
         note += '<br><span class="bad">not scored</span>'
     elif line.missed:
         note += f'<br><span class="bad">{text(line.missed)}</span>'
     elif line.level:
         note += f'<br><span class="words-level">{level_mark(line.level)}</span>'
-    link = f'<a href="#pair-{line.number}" title="{escape(line.paths)}">{text(line.name)}</a>'
+    link = f'<a href="#pair-{line.number}" title="{escape(line.paths)}">{name_text(line.name)}</a>'
     cells = [f'<th scope="row" data-value="{escape(line.name)}">{link}<br>{note}</th>']
     for column in TABLE:
         value = value_of(record, column)
