@@ -7,6 +7,7 @@ import base64
 import fcntl
 import json
 import os
+import re
 import select
 import subprocess
 import tempfile
@@ -86,7 +87,7 @@ class Page:
             "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width < 600
         )
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
-        self._call("Emulation.setEmulatedMedia", features=[scheme])
+        self._call("Emulation.setEmulatedMedia", media="", features=[scheme])
         self._events.clear()
         answer = self._call("Page.navigate", url=path.resolve().as_uri())
         assert "errorText" not in answer, f"{path}: {answer['errorText']}"
@@ -162,6 +163,16 @@ class Page:
             "return {x: r.x + scrollX, y: r.y + scrollY, width: r.width, height: r.height, scale: 1} })()"
         )
         return base64.b64decode(self._call("Page.captureScreenshot", clip=clip)["data"])
+
+    def as_on_paper(self, dark: bool = False) -> None:
+        """The styles of paper, for who else prefers light or dark."""
+        scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
+        self._call("Emulation.setEmulatedMedia", media="print", features=[scheme])
+
+    def sheets(self) -> int:
+        """How many pages of A4 it takes in print."""
+        pdf = base64.b64decode(self._call("Page.printToPDF", paperWidth=8.27, paperHeight=11.69)["data"])
+        return len(re.findall(rb"/Type /Page\b", pdf))
 
     def picture(self, path: Path) -> None:
         """A PNG of the whole page."""

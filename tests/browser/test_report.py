@@ -227,15 +227,63 @@ def test_a_thousand_pairs_stay_fluid(page: Page, many: Path) -> None:
     assert page.messages == []
 
 
-def test_on_paper_stands_every_pair(page: Page, report: Path) -> None:
+def test_on_paper_stands_every_pair_that_is_shown(page: Page, report: Path) -> None:
     page.open(report, width=1280)
-    page.run("dispatchEvent(new Event('beforeprint'))")
-    assert page.run("document.querySelectorAll('.pair').length") == 3
-    page.run("dispatchEvent(new Event('afterprint'))")
-    assert page.run("document.querySelectorAll('.pair').length") == 1
+    for wanted, count in (("all", 3), ("failed", 1)):
+        page.click(f"[data-filter={wanted}]")
+        page.run("dispatchEvent(new Event('beforeprint'))")
+        assert page.run("document.querySelectorAll('.pair').length") == count
+        page.run("dispatchEvent(new Event('afterprint'))")
+        assert page.run("document.querySelectorAll('.pair').length") == 1
 
 
-def test_a_phone_scrolls_only_downwards(page: Page, report: Path) -> None:
+def test_paper_is_white_and_a_pair_takes_a_sheet(page: Page, report: Path) -> None:
+    page.open(report, width=1280, dark=True)
+    assert page.sheets() <= 4  # the overview, two pairs, and one that was not scored
+    page.as_on_paper(dark=True)
+    style = "getComputedStyle(document.documentElement).getPropertyValue('--{}')"
+    dark = {
+        name for name in ("ink", "faint", "accent", "warn", "bad") if brightness(page.run(style.format(name))) > 140
+    }
+    pale = {name for name in ("paper", "card", "track") if brightness(page.run(style.format(name))) < 200}
+    assert not dark | pale
+
+
+def brightness(color: str) -> float:
+    """Of #rgb or #rrggbb, from 0 to 255."""
+    digits = color.strip()[1:]
+    parts = [int(digit * 2, 16) for digit in digits] if len(digits) == 3 else list(bytes.fromhex(digits))
+    return sum(parts) / 3
+
+
+def test_marks_stay_on_their_pictures_in_a_low_window(page: Page, report: Path) -> None:
+    page.open(report, width=1280, height=300)
+    page.click(".level:first-child .tile")
+    sides = page.run(
+        "[...document.querySelectorAll('.views .picture')].map((each) => {"
+        "const image = each.querySelector('img'), { width, height } = each.getBoundingClientRect();"
+        "return [width, height, image.getAttribute('width') / image.getAttribute('height')] })"
+    )
+    assert sides and all(width == pytest.approx(ratio * height, abs=1) for width, height, ratio in sides)
+    assert all(height <= 0.8 * 300 + 1 for _, height, _ in sides)
+
+
+def test_nothing_hides_behind_the_toolbar(page: Page, many: Path) -> None:
+    """A card's title when it opens, and the table's heads as one scrolls."""
+    bottom = "document.querySelector('.toolbar').getBoundingClientRect().bottom"
+    top = "document.querySelector('{}').getBoundingClientRect().top"
+    for width in (800, 1280):
+        page.open(many, width=width)
+        page.click(".level:nth-child(2) .tile")
+        assert page.run(top.format(".pair h3")) >= page.run(bottom) > 0
+    page.click("[data-show=table]")
+    page.run("scrollTo(0, 1500); new Promise((done) => setTimeout(done, 50))")
+    assert abs(page.run(top.format(".scores th")) - page.run(bottom)) < 2
+
+
+def test_a_phone_scrolls_only_downwards(page: Page, report: Path, many: Path) -> None:
+    page.open(many, width=360)  # also where there is more than is in view
+    assert page.run("[document.documentElement.scrollWidth, innerWidth]") == [360, 360]
     page.open(report, width=375)
     page.click(".level:first-child .tile")
     assert page.run("[document.documentElement.scrollWidth, innerWidth]") == [375, 375]

@@ -69,11 +69,12 @@
     layMore();
   }
   one("button", more).addEventListener("click", () => extend(SOME));
-  // Cards that are closed stand outside of the page, but on paper.
+  // Cards that are closed stand outside of the page, but on paper those of what is shown.
   place.replaceChildren();
   addEventListener("beforeprint", () => {
     extend(pairs.length);
-    place.append(...[...cards.values()].filter((card) => card !== open?.card));
+    const wanted = pairs.filter((pair) => pair.shown).map((pair) => cards.get(pair.row.dataset.number));
+    place.append(...wanted.filter((card) => card !== open?.card));
   });
   addEventListener("afterprint", () => place.replaceChildren());
   for (const button of all("[data-filter]")) {
@@ -191,6 +192,11 @@
     if (event.key === "Escape" && open && !one("dialog[open]") && !event.target.closest("input, select")) close();
   });
   addEventListener("hashchange", follow);
+
+  // What is scrolled to comes to stand below what sticks to the top.
+  new ResizeObserver(() => {
+    document.documentElement.style.setProperty("--toolbar", `${toolbar.offsetHeight}px`);
+  }).observe(toolbar);
 
   filter();
   const first = one(".first a")?.hash.slice("#pair-".length) ?? (pairs.length === 1 ? pairs[0].row.dataset.number : null);

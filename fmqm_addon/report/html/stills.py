@@ -21,16 +21,24 @@ def views(name: str, pictures: Record) -> str:
     """Three pictures on one camera for each view; the worst patches that can be seen are marked on the heat maps."""
     of_views = pictures["views"]
     return "".join(
-        f'<section class="view"><h4>{_title(view["name"], len(of_views))}</h4>'
-        f'<div class="views">{_figures(name, pictures, view, number)}</div></section>'
+        f'<section class="view"><h4>{_title(view["name"], len(of_views), bool(pictures["worst"]))}</h4>'
+        f'<div class="views" style="--ratio:{_ratio(view["size"]):.4f}">'
+        f"{_figures(name, pictures, view, number)}</div></section>"
         for number, view in enumerate(of_views)
     )
 
 
-def _title(view: str, count: int) -> str:
+def _title(view: str, count: int, is_loss: bool) -> str:
     if view == LOSS:
         return "From the side of the loss"
-    return "From the front" if count > 1 else "From the front, which shows about as much of the loss as any side"
+    front = "From the front (-Y)"
+    return f"{front}, which shows about as much of the loss as any side" if count == 1 and is_loss else front
+
+
+def _ratio(size: Sequence[object]) -> float:
+    """Width by height; 1 where a record, which may be a stranger's, has no such numbers."""
+    width, height = size
+    return width / height if isinstance(width, int) and isinstance(height, int) and height > 0 else 1.0
 
 
 def _figures(name: str, pictures: Record, view: Record, number: int) -> str:

@@ -97,7 +97,8 @@ fmqmViewer.camera = (() => {
       const out = new THREE.Vector3(...normal);
       const place = out.length() > 0 ? polar(out) : home()[1];
       place.elevation = Math.min(Math.max(place.elevation, -STEEPEST), STEEPEST);
-      place.radius = distanceFor(SURROUNDINGS * diagonal, SURROUNDINGS * diagonal);
+      // Never from farther away than all of it is seen from.
+      place.radius = Math.min(distanceFor(SURROUNDINGS * diagonal, SURROUNDINGS * diagonal), home()[1].radius);
       fly(new THREE.Vector3(...center), place);
     }
 

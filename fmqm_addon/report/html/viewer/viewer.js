@@ -169,9 +169,13 @@ fmqmViewer.show = (() => {
       bar.style.background = `linear-gradient(90deg, ${ramp.join(",")})`;
       legend.replaceChildren(
         element("span", { textContent: layer.label }),
-        element("span", { textContent: number(layer.low) }),
-        bar,
-        element("span", { textContent: number(layer.high) + (layer.name === "SDF_DIFFERENCE" ? " scene units" : "") }),
+        element(
+          "span",
+          { className: "viewer-scale" },
+          element("span", { textContent: number(layer.low) }),
+          bar,
+          element("span", { textContent: number(layer.high) + (layer.name === "SDF_DIFFERENCE" ? " scene units" : "") }),
+        ),
         level.heat.partial ? element("span", { textContent: "dimmed: not measured" }) : "",
       );
       later();
