@@ -16,6 +16,7 @@ from ..metric.evaluation import Result
 from ..metric.perceived import PERCEIVED_COLUMNS
 from ..metric.surface import Surface
 from .causes import Facts, causes
+from .numbers import PLACES, score_text
 
 SEED_NOISE = 0.01  # FMQM of other seeds differs by less than this
 PERCEIVED_NOISE = 0.002  # and perceived by less than this
@@ -180,7 +181,7 @@ def _doubt(record: Mapping[str, Any]) -> Iterator[str]:
 
 def _short(number: float) -> str:
     """Two places, or as many as tell it from 1."""
-    return f"{number:.2f}" if number == 1 or number < 0.995 else f"{min(number, 0.9999):.4f}"
+    return score_text(number, places=2 if number == 1 or number < 0.995 else PLACES)
 
 
 def _joined(words: Sequence[str]) -> str:

@@ -11,10 +11,13 @@ PLACES = 4  # of a score; random samples alone move the third
 
 
 def score_text(value: float | None, stderr: float | None = None, places: int = PLACES) -> str:
-    """A score, with its standard error where that is known; MISSING: there is none."""
+    """A score, with its standard error where that is known; MISSING: there is none.
+
+    Only 1 itself reads as 1: what would be rounded to it is written as the highest number below, such as 0.9999.
+    """
     if value is None:
         return MISSING
-    text = f"{value:.{places}f}"
+    text = f"{value if value == 1 else min(value, 1 - 10.0**-places):.{places}f}"
     return text if stderr is None else f"{text} ± {stderr:.{places}f}"
 
 

@@ -8,6 +8,7 @@ from typing import ClassVar
 import bpy
 from mathutils import Matrix
 
+from ..report.numbers import score_text
 from .view import heat, legends, overlay, slice_plane
 from .view.legends import BELOW, HIGH, LOW
 from .view.result import look_of
@@ -101,7 +102,8 @@ class FMQM_GT_legend(bpy.types.Gizmo):  # noqa: N801
         self.to_y = event.mouse_region_y
         values = legends.moved(self.end, self.before, (self.to_y - self.from_y) / bar[3])
         self._set(context, values)
-        context.area.header_text_set(f"{_NAMES[self.end]}: {values[(LOW, HIGH, BELOW).index(self.end)]:.3f}")
+        value = values[(LOW, HIGH, BELOW).index(self.end)]
+        context.area.header_text_set(f"{_NAMES[self.end]}: {score_text(value, places=3)}")
         return {"RUNNING_MODAL"}
 
     def exit(self, context: bpy.types.Context, cancel: bool) -> None:

@@ -250,6 +250,7 @@ def test_heat_has_the_values_of_patches_and_samples(pair: tuple[Surface, Surface
     assert np.array(heat["centers"]).reshape(-1, 3) == pytest.approx(result.patch_centers, abs=1e-6)
     lowest = np.sort(result.of_patches("perceived"))[:5]
     assert [place["score"] for place in heat["worst"]] == pytest.approx(lowest, abs=1e-5) and not heat["partial"]
+    assert all(place["words"].startswith(f"{score:.3f}; ") for place, score in zip(heat["worst"], lowest, strict=True))
     cells = heat["cells"][0]
     color, distance, known = unpacked(cells["data"], 3, np.uint8).T / 255
     place = ((result.ref.nearest - cells["low"]) / cells["size"]).astype(int)

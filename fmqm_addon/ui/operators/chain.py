@@ -67,7 +67,7 @@ class FMQM_OT_lod_chain(VersionsOperator, bpy.types.Operator):  # noqa: N801
         names = made[0].name if len(made) == 1 else f"{made[0].name} to {made[-1].name}"
         told = f"{names}: {counts} of {found.result.triangles:,} triangles{hidden}"
         whole = [
-            f"{object_.name} has all of them, as fewer miss {each.searched.last.target:.2f}"
+            f"{object_.name} has all of them, as fewer miss {each.searched.last.target:g}"
             for object_, each in zip(made, found.versions, strict=True)
             if each.version.ratio == 1
         ]

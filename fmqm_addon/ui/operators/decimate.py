@@ -48,7 +48,7 @@ class FMQM_OT_decimate(VersionsOperator, bpy.types.Operator):  # noqa: N801
             sides,
             judge,
         )
-        name = f" {judge.column} {goal.targets[0]:.2f}"
+        name = f" {judge.column} {score_text(goal.targets[0], places=2)}"
         return Search(goal, active.name, (_free(active.name, name),), active.name)
 
     def finish(self, context: bpy.types.Context) -> set[str]:
@@ -64,7 +64,7 @@ class FMQM_OT_decimate(VersionsOperator, bpy.types.Operator):  # noqa: N801
             score = best.score(judge)
             self.report(
                 {"WARNING"},
-                f"{original.name} misses {searched.last.target:.2f} even with {best.triangles:,} triangles"
+                f"{original.name} misses {searched.last.target:g} even with {best.triangles:,} triangles"
                 + ("" if score is None else f" ({judge.column} {score_text(score)})"),
             )
             return {"CANCELLED"}
@@ -79,7 +79,7 @@ class FMQM_OT_decimate(VersionsOperator, bpy.types.Operator):  # noqa: N801
         if searched.last.reached:
             self.report({"INFO"}, told)
         else:
-            self.report({"WARNING"}, f"{told}. It misses {searched.last.target:.2f} for smaller textures: they stay")
+            self.report({"WARNING"}, f"{told}. It misses {searched.last.target:g} for smaller textures: they stay")
         return {"FINISHED"}
 
 

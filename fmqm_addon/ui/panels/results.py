@@ -189,7 +189,7 @@ def _draw_verdict(layout: bpy.types.UILayout, context: bpy.types.Context, fmqm: 
         wrapped(note, context, _beginning(verdict(record)))
     numbers = box.column(align=True)
     for judge in Judge:
-        was = "" if former is None else f", was {former[judge.column]:.2f}"
+        was = "" if former is None else f", was {score_text(former[judge.column])}"
         split = numbers.split(factor=0.4)
         split.label(text=LABELS[judge.column])
         split.label(text=f"{score_text(scores[judge.column])}{was}")
@@ -199,7 +199,7 @@ def _draw_verdict(layout: bpy.types.UILayout, context: bpy.types.Context, fmqm: 
         label = split.row()
         label.alignment = "LEFT"
         label.operator("fmqm.sort_rows", text=LABELS[name], emboss=False, icon_value=swatch(scores[name])).column = name
-        split.progress(factor=scores[name], text=f"{scores[name]:.2f}")
+        split.progress(factor=scores[name], text=score_text(scores[name], places=3))
     if row.uid in session.stale:
         wrapped(layout, context, session.stale[row.uid], icon="FILE_REFRESH")
     elif session.get(row.uid) is None:

@@ -7,6 +7,7 @@ from typing import Any
 
 import bpy
 
+from ...report.numbers import score_text
 from .. import session
 from ..operators.pick import FMQM_OT_unit_pick
 from ..operators.probe import FMQM_OT_probe
@@ -29,7 +30,7 @@ class FMQM_UL_worst(bpy.types.UIList):  # noqa: N801
         self, _context: Any, layout: Any, _data: Any, item: Any, _icon: int, _active: Any, _property: str
     ) -> None:
         split = layout.split(factor=0.24)
-        split.label(text=f"{item.score:.3f}")
+        split.label(text=score_text(item.score, places=3))
         split = split.split(factor=0.72)
         split.label(text=item.blame)
         split.label(text=f"#{item.patch}")

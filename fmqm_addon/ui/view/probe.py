@@ -10,6 +10,7 @@ import numpy as np
 from bpy_extras.view3d_utils import region_2d_to_origin_3d, region_2d_to_vector_3d
 
 from ...comparison.judge import Judge
+from ...report.numbers import score_text
 from ...report.visual import layers
 from ...report.visual.heat_map import UNCOVERED, patches_at
 from .. import session
@@ -61,8 +62,6 @@ def lines_of(scene: bpy.types.Scene, probed: Probed) -> list[str]:
     if probed.patch == UNCOVERED:
         return [f"{where}: not measured here"]
     result, judge = measured.comparison.result, Judge[scene.fmqm.judge]
-    score = result.of_patches(judge.column)[probed.patch]
-    lines = [f"{where}, patch {probed.patch}", f"{layers.LAYERS[judge.column].label} {score:.3f}"]
-    return lines + [
-        f"{layers.LAYERS[name].label} {result.of_patches(name)[probed.patch]:.3f}" for name in judge.features
-    ]
+    values = {name: result.of_patches(name)[probed.patch] for name in (judge.column, *judge.features)}
+    scores = [f"{layers.LAYERS[name].label} {score_text(value, places=3)}" for name, value in values.items()]
+    return [f"{where}, patch {probed.patch}", *scores]

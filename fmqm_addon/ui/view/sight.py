@@ -13,6 +13,7 @@ from mathutils import Matrix, Vector
 from ...comparison.judge import Judge
 from ...metric.geometry import Floats
 from ...report.html.pictures import CLOSE_UP_MARGIN
+from ...report.numbers import score_text
 from ...report.render import Camera
 from ...report.visual import layers
 from ...report.visual.colormap import NO_PATCH
@@ -122,4 +123,4 @@ def heat_text(scene: bpy.types.Scene, measured: session.Measured, patch: int) ->
     layer = heat_layer(scene)
     value = layers.patch_values(measured.comparison.result, layer)[patch]
     label = layers.LAYERS[layer].label
-    return f"{label} {value:.3f}" if layers.LAYERS[layer].kind == layers.SCORE else f"patch {patch}"
+    return f"{label} {score_text(value, places=3)}" if layers.LAYERS[layer].kind == layers.SCORE else f"patch {patch}"

@@ -10,6 +10,7 @@ from ...blender.display import viewport
 from ...comparison.judge import Judge
 from ...metric.errors import FMQMError
 from ...metric.evaluation import Result
+from ...report.numbers import score_text
 from ...report.visual import layers
 from ...report.visual.worst import patch_view, worst_patches
 from ..properties.rows import active_row
@@ -45,7 +46,7 @@ def fill_worst(look: FMQMLook, result: Result, uid: str) -> None:
         item = look.worst.add()
         item.name = f"Patch {worst.patch}"
         item.patch, item.score, item.value = worst.patch, worst.score, worst.value
-        item.blame = f"{layers.LAYERS[worst.blame].label} {worst.value:.2f}"
+        item.blame = f"{layers.LAYERS[worst.blame].label} {score_text(worst.value, places=2)}"
     look.worst_uid = uid
     choose_worst(look, 0)
 

@@ -11,6 +11,7 @@ from ....comparison.judge import Judge
 from ....metric.evaluation import Result
 from ....metric.fields import Fields
 from ....metric.geometry import Floats
+from ...numbers import score_text
 from ...visual.heat_map import fitted_range
 from ...visual.layers import LAYERS, LENGTH, SCORE, field_values, value_range
 from ...visual.worst import patch_view, worst_patches
@@ -108,8 +109,8 @@ def _worst(result: Result, judge: Judge) -> list[dict[str, Any]]:
                 "normal": _rounded(normal),
                 "diagonal": round(diagonal, _DIGITS),
                 "score": round(worst.score, 5),
-                "blame": LAYERS[worst.blame].label,
-                "value": round(worst.value, 5),
+                "words": f"{score_text(worst.score, places=3)}; {LAYERS[worst.blame].label} "
+                f"{score_text(worst.value, places=3)}",
             }
         )
     return found

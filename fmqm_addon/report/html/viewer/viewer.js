@@ -260,7 +260,7 @@ fmqmViewer.show = (() => {
         const fly = button("", () => view.flyTo(each));
         fly.append(
           element("strong", { textContent: rank + 1 }),
-          ` ${level.judge} ${each.score.toFixed(3)}; ${each.blame} ${each.value.toFixed(3)}`,
+          ` ${level.judge} ${each.words}`,
         );
         return element("li", {}, fly);
       }),
