@@ -18,6 +18,8 @@ from typing import Any
 
 import bpy
 import numpy as np
+from bpy_extras.view3d_utils import region_2d_to_location_3d
+from mathutils import Matrix, Vector
 
 sys.path[:0] = [os.path.join(os.environ["FMQM_ROOT"], *parts) for parts in (("scripts",), ("tests", "window"))]
 from monkeys import build
@@ -25,6 +27,7 @@ from window_steps import play, view
 
 OUT = Path(os.environ["FMQM_OUT"])
 CROP = 240  # pixels in the middle of the view that the flip's pictures are compared in
+SQUARE = 20  # pixels a side
 REPORT: dict[str, Any] = {}
 EXPECTED: dict[str, np.ndarray] = {}
 
@@ -119,6 +122,47 @@ def close() -> None:
     REPORT["dirty"] = bpy.data.is_dirty
     REPORT["blocks after"] = blocks()
     REPORT["file after"] = saved()
+
+
+def ramps() -> None:
+    """Colors from black to white by each of the means that draw over a view: a row of squares each."""
+    window, display, space = region(), "blender.display", view()[1].spaces.active.region_3d
+    space.view_perspective, space.view_rotation = "ORTHO", (0.5**0.5, 0.5**0.5, 0, 0)  # from the front
+    space.update()  # what faces the viewer is in its full color
+    colors = np.repeat(np.linspace(0, 1, 12)[:, None], 3, axis=1) * (1.0, 0.8, 0.6)
+    REPORT["ramp"] = {"x": window.x + window.width // 2, "y": window.y + 60, "side": SQUARE}
+
+    def corners(row: int, number: int) -> list[Vector]:
+        left, low = window.width // 2 + number * SQUARE, 60 + row * SQUARE
+        at = [(left, low), (left + SQUARE, low), (left + SQUARE, low + SQUARE), (left, low + SQUARE)]
+        return [region_2d_to_location_3d(window, space, place, Vector((0, -8, 0))) for place in at]
+
+    squares = np.array([corners(0, number) for number in range(len(colors))]).reshape(-1, 3)
+    faces = np.arange(0, len(squares), 4)[:, None, None] + np.array([(0, 1, 2), (0, 2, 3)])
+    mesh = ours(f"{display}.colored_mesh").from_faces(squares, faces.reshape(-1, 3), np.arange(len(colors)).repeat(2))
+    mesh.set_colors(colors)
+    pictures = []
+    for number, color in enumerate(colors):
+        a, b, _, d = corners(1, number)
+        matrix = Matrix((b - a, d - a, (0, 0, 0))).transposed().to_4x4()
+        matrix.translation = (b + d) / 2
+        pictures.append((ours(f"{display}.picture").Picture(color[None]), matrix))
+    inset = ours(f"{display}.inset").Inset(np.rint(255 * colors)[None].astype(np.uint8))
+
+    def in_space() -> None:
+        mesh.draw(Matrix(), bpy.context.region_data)
+        for picture, matrix in pictures:
+            picture.draw(matrix, bpy.context.region_data)
+
+    def over_it() -> None:
+        left, low = window.width // 2, 60 + 2 * SQUARE
+        inset.draw(left, low, len(colors) * SQUARE, SQUARE)
+        for number, color in enumerate(colors.tolist()):
+            ours("ui.view.ink").box(left + number * SQUARE, low + SQUARE, SQUARE, SQUARE, (*color, 1.0))
+
+    for draw, when in ((in_space, "POST_VIEW"), (over_it, "POST_PIXEL")):
+        bpy.types.SpaceView3D.draw_handler_add(draw, (), "WINDOW", when)
+    EXPECTED["ramp"] = np.rint(255 * colors)
     np.savez(OUT / "expected.npz", **EXPECTED)
     (OUT / "report.json").write_text(json.dumps(REPORT))
 
@@ -164,6 +208,7 @@ STEPS: list[tuple[Callable[[], object], str]] = [
     (turn, "original"),
     (wipe, "wipe"),
     (close, ""),
+    (ramps, "ramps"),
 ]
 
 play(STEPS, at_work, (OUT / "error.txt").write_text)

@@ -54,6 +54,14 @@ def test_flip_shows_what_the_report_would(seen: dict[str, Pixels], name: str, ot
     assert error.mean() < 0.5 * np.abs(shown - not_wanted).max(axis=2)[inside].mean()
 
 
+@pytest.mark.parametrize(("row", "means"), list(enumerate(["heat map", "slice", "loupe and flip", "legend"])))
+def test_a_view_shows_the_colors_that_are_meant(seen: dict[str, Pixels], row: int, means: str) -> None:
+    ramp, wanted = REPORT["ramp"], seen["expected ramp"]
+    place = [ramp["x"], ramp["y"] + row * ramp["side"], len(wanted) * ramp["side"], ramp["side"]]
+    middles = cut(seen["ramps"], place)[ramp["side"] // 2, ramp["side"] // 2 :: ramp["side"]]
+    assert np.abs(middles - wanted).max() < 2.5 / 255, f"{means}: {255 * middles} for {255 * wanted}"
+
+
 def test_wipe_shows_one_beside_the_other(seen: dict[str, Pixels]) -> None:
     left, bottom, width, height = REPORT["region"]
     border = left + round(width * REPORT["wipe"])

@@ -10,16 +10,14 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-import gpu
 import numpy as np
 from mathutils import Matrix, Vector
 from numpy.typing import NDArray
 
-from ...metric.colorspace import decode_srgb
+from . import drawing
 
 Array = NDArray[Any]
 
-_WIDTH = 1024  # of the texture that holds the colors
 # How much nearer to the viewer it is drawn than the surface that it lies on, in distances: the same one, or one that
 # is shown with other levels of detail than renders have.
 SAME, SIMILAR = 4e-4, 4e-3
@@ -42,7 +40,7 @@ void main() {
   float facing = abs(dot(normal, towards)) / max(length(normal) * length(towards), 1e-20);
   color = vec4(found.rgb * mix(0.55, 1.0, facing), 1.0);
 }
-""".replace("WIDTH", str(_WIDTH))
+""".replace("WIDTH", str(drawing.TABLE_WIDTH))
 
 
 class ColoredMesh:
@@ -81,21 +79,17 @@ class ColoredMesh:
             return
         shader = _shader()
         if self._batch is None:
-            self._batch = _batch(self.vertices, self._triangles, self._entry)
+            self._batch = drawing.triangles({"pos": self.vertices, "entry": self._entry}, self._triangles)
         if self._table is None:
-            self._table = _texture(self.colors)
-        depth, mask = gpu.state.depth_test_get(), gpu.state.depth_mask_get()
-        gpu.state.depth_test_set("LESS_EQUAL")
-        gpu.state.depth_mask_set(True)
-        try:
+            shown = self.colors.copy()
+            shown[:, :3] = drawing.for_view(shown[:, :3])
+            self._table = drawing.table(shown, "RGBA32F")
+        with drawing.depth_tested():
             shader.bind()
             shader.uniform_float("matrix", clip_matrix(region_3d, nearer) @ region_3d.view_matrix @ matrix)
             shader.uniform_float("towards", _towards(region_3d, matrix))
             shader.uniform_sampler("table", self._table)
             self._batch.draw(shader)
-        finally:
-            gpu.state.depth_mask_set(mask)
-            gpu.state.depth_test_set(depth)
 
 
 def from_faces(vertices: Array, triangles: Array, entry: Array) -> ColoredMesh:
@@ -122,37 +116,12 @@ def _towards(region_3d: Any, matrix: Matrix) -> Vector:
 
 @cache
 def _shader() -> Any:
-    info = gpu.types.GPUShaderCreateInfo()
-    info.push_constant("MAT4", "matrix")
-    info.push_constant("VEC3", "towards")
-    info.sampler(0, "FLOAT_2D", "table")
-    info.vertex_in(0, "VEC3", "pos")
-    info.vertex_in(1, "FLOAT", "entry")
-    between = gpu.types.GPUStageInterfaceInfo("fmqm_between")
-    between.flat("FLOAT", "number")
-    between.smooth("VEC3", "place")
-    info.vertex_out(between)
-    info.fragment_out(0, "VEC4", "color")
-    info.vertex_source(_VERTEX)
-    info.fragment_source(_FRAGMENT)
-    return gpu.shader.create_from_info(info)
-
-
-def _batch(vertices: Array, triangles: Array, entry: Array) -> Any:
-    form = gpu.types.GPUVertFormat()
-    form.attr_add(id="pos", comp_type="F32", len=3, fetch_mode="FLOAT")
-    form.attr_add(id="entry", comp_type="F32", len=1, fetch_mode="FLOAT")
-    buffer = gpu.types.GPUVertBuf(form, len(vertices))
-    buffer.attr_fill("pos", np.ascontiguousarray(vertices, np.float32))
-    buffer.attr_fill("entry", np.ascontiguousarray(entry, np.float32))
-    index = gpu.types.GPUIndexBuf(type="TRIS", seq=np.ascontiguousarray(triangles, np.int32))
-    return gpu.types.GPUBatch(type="TRIS", buf=buffer, elem=index)
-
-
-def _texture(colors: Array) -> Any:
-    rows = -(-len(colors) // _WIDTH)
-    pixels = np.zeros((rows * _WIDTH, 4), np.float32)
-    pixels[: len(colors)] = colors
-    pixels[:, :3] = decode_srgb(pixels[:, :3])  # views are drawn into linear buffers
-    buffer = gpu.types.Buffer("FLOAT", pixels.size, pixels.ravel())
-    return gpu.types.GPUTexture((_WIDTH, rows), format="RGBA32F", data=buffer)
+    return drawing.shader(
+        _VERTEX,
+        _FRAGMENT,
+        constants={"matrix": "MAT4", "towards": "VEC3"},
+        sampler="table",
+        inputs={"pos": "VEC3", "entry": "FLOAT"},
+        smooth={"place": "VEC3"},
+        flat={"number": "FLOAT"},
+    )

@@ -9,10 +9,11 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
 from numpy.typing import NDArray
+
+from . import drawing
 
 _VERTEX = """
 void main() {
@@ -20,7 +21,6 @@ void main() {
   gl_Position = ModelViewProjectionMatrix * vec4(pos, 0.0, 1.0);
 }
 """
-# Blender takes what is drawn over a view for linear light, and shows it by a power of 2.2, whatever the screen.
 _FRAGMENT = """
 void main() {
   ivec2 size = textureSize(picture, 0), first = ivec2(floor(place * vec2(size / finer))) * finer;
@@ -28,9 +28,9 @@ void main() {
   for (int i = 0; i < finer * finer; i++) {
     sum += texelFetch(picture, min(first + ivec2(i % finer, i / finer), size - 1), 0).rgb;
   }
-  color = vec4(pow(sum / float(finer * finer), vec3(2.2)), 1.0);
+  color = vec4(pow(sum / float(finer * finer), vec3(POWER)), 1.0);
 }
-"""
+""".replace("POWER", str(drawing.VIEW_POWER))
 
 
 class Inset:
@@ -71,24 +71,17 @@ def draw_texture(
 
 @cache
 def _shader() -> Any:
-    info = gpu.types.GPUShaderCreateInfo()
-    info.push_constant("MAT4", "ModelViewProjectionMatrix")
-    info.push_constant("INT", "finer")
-    info.sampler(0, "FLOAT_2D", "picture")
-    info.vertex_in(0, "VEC2", "pos")
-    info.vertex_in(1, "VEC2", "at")
-    between = gpu.types.GPUStageInterfaceInfo("fmqm_inset")
-    between.smooth("VEC2", "place")
-    info.vertex_out(between)
-    info.fragment_out(0, "VEC4", "color")
-    info.vertex_source(_VERTEX)
-    info.fragment_source(_FRAGMENT)
-    return gpu.shader.create_from_info(info)
+    return drawing.shader(
+        _VERTEX,
+        _FRAGMENT,
+        constants={"ModelViewProjectionMatrix": "MAT4", "finer": "INT"},
+        sampler="picture",
+        inputs={"pos": "VEC2", "at": "VEC2"},
+        smooth={"place": "VEC2"},
+    )
 
 
 def _texture(pixels: NDArray[np.uint8]) -> Any:
-    height, width, _ = pixels.shape
-    values = np.ones((height, width, 4), np.float32)
+    values = np.ones((*pixels.shape[:2], 4), np.float32)
     values[..., :3] = pixels[::-1] / np.float32(255)
-    buffer = gpu.types.Buffer("FLOAT", values.size, values.ravel())
-    return gpu.types.GPUTexture((width, height), format="RGBA8", data=buffer)
+    return drawing.texture(values, "RGBA8")

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import gpu
@@ -10,12 +11,23 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 from mathutils import Matrix
 
-from ...metric.colorspace import decode_srgb
 from ...metric.geometry import Floats
+from . import drawing
 from .colored_mesh import clip_matrix
 
 _CORNERS = ((-0.5, -0.5, 0.0), (0.5, -0.5, 0.0), (0.5, 0.5, 0.0), (-0.5, 0.5, 0.0))
 _FACES = ((0, 1, 2), (0, 2, 3))
+_VERTEX = """
+void main() {
+  place = pos.xy + 0.5;
+  gl_Position = ModelViewProjectionMatrix * vec4(pos, 1.0);
+}
+"""
+_FRAGMENT = """
+void main() {
+  color = vec4(pow(texture(picture, place).rgb, vec3(POWER)), 1.0);
+}
+""".replace("POWER", str(drawing.VIEW_POWER))
 _RIM = (0.05, 0.05, 0.05, 1.0)
 
 
@@ -37,30 +49,29 @@ class Picture:
             matrix: from the square to the world. region_3d: of the view.
         """
         if self._texture is None:
-            self._texture = _texture(self.colors, self.side)
-        depth, mask = gpu.state.depth_test_get(), gpu.state.depth_mask_get()
-        gpu.state.depth_test_set("LESS_EQUAL")
-        gpu.state.depth_mask_set(True)
-        try:
-            with gpu.matrix.push_pop(), gpu.matrix.push_pop_projection():
-                gpu.matrix.load_projection_matrix(clip_matrix(region_3d))
-                gpu.matrix.load_matrix(region_3d.view_matrix @ matrix)
-                shader = gpu.shader.from_builtin("IMAGE")
-                places = [(x + 0.5, y + 0.5) for x, y, _ in _CORNERS]
-                batch = batch_for_shader(shader, "TRIS", {"pos": _CORNERS, "texCoord": places}, indices=_FACES)
-                shader.uniform_sampler("image", self._texture)
-                batch.draw(shader)
-                rim = gpu.shader.from_builtin("UNIFORM_COLOR")
-                rim.uniform_float("color", _RIM)
-                batch_for_shader(rim, "LINE_STRIP", {"pos": (*_CORNERS, _CORNERS[0])}).draw(rim)
-        finally:
-            gpu.state.depth_mask_set(mask)
-            gpu.state.depth_test_set(depth)
+            pixels = np.ones((self.side, self.side, 4), np.float32)
+            pixels[..., :3] = self.colors.reshape(self.side, self.side, 3)
+            self._texture = drawing.texture(pixels, "RGBA16F")
+        with drawing.depth_tested(), gpu.matrix.push_pop(), gpu.matrix.push_pop_projection():
+            gpu.matrix.load_projection_matrix(clip_matrix(region_3d))
+            gpu.matrix.load_matrix(region_3d.view_matrix @ matrix)
+            shader = _shader()
+            batch = batch_for_shader(shader, "TRIS", {"pos": _CORNERS}, indices=_FACES)
+            shader.bind()
+            shader.uniform_sampler("picture", self._texture)
+            batch.draw(shader)
+            rim = gpu.shader.from_builtin("UNIFORM_COLOR")
+            rim.uniform_float("color", _RIM)
+            batch_for_shader(rim, "LINE_STRIP", {"pos": (*_CORNERS, _CORNERS[0])}).draw(rim)
 
 
-def _texture(colors: Floats, side: int) -> Any:
-    pixels = np.ones((len(colors), 4), np.float32)
-    pixels[:, :3] = decode_srgb(colors)  # views are drawn into linear buffers
-    return gpu.types.GPUTexture(
-        (side, side), format="RGBA16F", data=gpu.types.Buffer("FLOAT", pixels.size, pixels.ravel())
+@cache
+def _shader() -> Any:
+    return drawing.shader(
+        _VERTEX,
+        _FRAGMENT,
+        constants={"ModelViewProjectionMatrix": "MAT4"},
+        sampler="picture",
+        inputs={"pos": "VEC3"},
+        smooth={"place": "VEC2"},
     )

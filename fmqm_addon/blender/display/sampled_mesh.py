@@ -14,9 +14,9 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
-Array = NDArray[Any]
+from . import drawing
 
-_WIDTH = 4096  # of the texture that holds the colors
+Array = NDArray[Any]
 
 _VERTEX = """
 void main() {
@@ -50,7 +50,7 @@ void main() {
   float lit = dot(away, LIGHT) * sign(dot(away, facing) * facing.z);
   color = vec4(found * mix(AMBIENT, 1.0, max(lit, 0.0)), 1.0);
 }
-""".replace("WIDTH", str(_WIDTH))
+""".replace("WIDTH", str(drawing.TABLE_WIDTH))
 
 
 class SampledMesh:
@@ -71,69 +71,42 @@ class SampledMesh:
             ambient: the share of their color that unlit faces have.
         """
         if self._arrays is not None:
-            self._batch, self._table = _batch(*self._arrays[:4]), _texture(self._arrays[4])
+            self._batch, self._table = _batch(*self._arrays[:4]), drawing.table(self._arrays[4] / 255, "RGBA8")
             self._arrays = None
         shader = _shader(light, ambient)
-        depth, mask, blend = gpu.state.depth_test_get(), gpu.state.depth_mask_get(), gpu.state.blend_get()
-        gpu.state.depth_test_set("LESS_EQUAL")
-        gpu.state.depth_mask_set(True)
+        blend = gpu.state.blend_get()
         gpu.state.blend_set("NONE")
         try:
-            shader.bind()
-            shader.uniform_float("to_view", to_view)
-            shader.uniform_float("to_clip", to_clip)
-            shader.uniform_sampler("table", self._table)
-            self._batch.draw(shader)
+            with drawing.depth_tested():
+                shader.bind()
+                shader.uniform_float("to_view", to_view)
+                shader.uniform_float("to_clip", to_clip)
+                shader.uniform_sampler("table", self._table)
+                self._batch.draw(shader)
         finally:
             gpu.state.blend_set(blend)
-            gpu.state.depth_mask_set(mask)
-            gpu.state.depth_test_set(depth)
 
 
 @cache
 def _shader(light: tuple[float, float, float], ambient: float) -> Any:
-    info = gpu.types.GPUShaderCreateInfo()
-    info.push_constant("MAT4", "to_view")
-    info.push_constant("MAT4", "to_clip")  # with the other one as much as every graphics card takes
-    info.sampler(0, "FLOAT_2D", "table")
-    between = gpu.types.GPUStageInterfaceInfo("fmqm_sampled")
-    info.vertex_in(0, "VEC3", "pos")
-    info.vertex_in(1, "VEC3", "direction")
-    info.vertex_in(2, "VEC2", "corner")
-    info.vertex_in(3, "VEC2", "cell")
-    between.smooth("VEC3", "normal")
-    between.smooth("VEC3", "seen")
-    between.smooth("VEC2", "weight")
-    between.flat("VEC2", "grid")
-    info.vertex_out(between)
-    info.fragment_out(0, "VEC4", "color")
-    info.vertex_source(_VERTEX)
-    info.define("LIGHT", "normalize(vec3({}, {}, {}))".format(*light))
-    info.define("AMBIENT", f"float({ambient})")
-    info.fragment_source(_FRAGMENT)
-    return gpu.shader.create_from_info(info)
+    return drawing.shader(
+        _VERTEX,
+        _FRAGMENT,
+        constants={"to_view": "MAT4", "to_clip": "MAT4"},  # the two are as much as every graphics card takes
+        sampler="table",
+        inputs={"pos": "VEC3", "direction": "VEC3", "corner": "VEC2", "cell": "VEC2"},
+        smooth={"normal": "VEC3", "seen": "VEC3", "weight": "VEC2"},
+        flat={"grid": "VEC2"},
+        defines={"LIGHT": "normalize(vec3({}, {}, {}))".format(*light), "AMBIENT": f"float({ambient})"},
+    )
 
 
 def _batch(positions: Array, normals: Array, first: Array, cells: Array) -> Any:
-    values = {
-        "pos": positions,
-        "direction": normals,
-        "corner": np.tile(np.array([(0, 0), (1, 0), (0, 1)]), (len(first), 1)),
-        "cell": np.stack([first, cells], axis=1).repeat(3, axis=0),
-    }
-    form = gpu.types.GPUVertFormat()
-    for name, rows in values.items():
-        form.attr_add(id=name, comp_type="F32", len=rows.shape[1], fetch_mode="FLOAT")
-    buffer = gpu.types.GPUVertBuf(form, len(positions))
-    for name, rows in values.items():
-        buffer.attr_fill(name, np.ascontiguousarray(rows, np.float32))
-    return gpu.types.GPUBatch(type="TRIS", buf=buffer)
-
-
-def _texture(colors: Array) -> Any:
-    rows = -(-len(colors) // _WIDTH)
-    values = np.zeros((rows * _WIDTH, 4), np.float32)
-    values[: len(colors), :3] = colors / np.float32(255)
-    return gpu.types.GPUTexture(
-        (_WIDTH, rows), format="RGBA8", data=gpu.types.Buffer("FLOAT", values.size, values.ravel())
+    return drawing.triangles(
+        {
+            "pos": positions,
+            "direction": normals,
+            "corner": np.tile(np.array([(0, 0), (1, 0), (0, 1)]), (len(first), 1)),
+            "cell": np.stack([first, cells], axis=1).repeat(3, axis=0),
+        }
     )

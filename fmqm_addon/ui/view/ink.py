@@ -6,7 +6,10 @@ from __future__ import annotations
 import blf
 import bpy
 import gpu
+import numpy as np
 from gpu_extras.batch import batch_for_shader
+
+from ...blender.display.drawing import for_own_shaders
 
 _FONT = 0
 _MARGIN = 14  # pixels at a UI scale of 1
@@ -80,8 +83,10 @@ def box(x: float, y: float, width: float, height: float, color: Color) -> None:
 
 
 def draw_shape(kind: str, positions: list[tuple[float, float]], colors: list[Color]) -> None:
+    """Colors that are encoded, as themes and legends have them."""
     shader = gpu.shader.from_builtin("SMOOTH_COLOR")
     gpu.state.blend_set("ALPHA")
-    flat = [(x, y, 0.0) for x, y in positions]
-    batch_for_shader(shader, kind, {"pos": flat, "color": colors}).draw(shader)
+    flat, shown = [(x, y, 0.0) for x, y in positions], np.array(colors, np.float32)
+    shown[:, :3] = for_own_shaders(shown[:, :3])
+    batch_for_shader(shader, kind, {"pos": flat, "color": shown}).draw(shader)
     gpu.state.blend_set("NONE")

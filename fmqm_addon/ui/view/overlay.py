@@ -16,6 +16,7 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 from numpy.typing import NDArray
 
+from ...blender.display.drawing import for_own_shaders
 from ...metric.geometry import Floats
 from .. import session
 from ..properties.rows import active_row
@@ -266,6 +267,7 @@ def _picture_batch(picture: UnitPicture) -> Any:
         ]
     )
     colors = np.repeat(np.concatenate([picture.colors[row, column], rim, dots]), 6, axis=0)
+    colors[:, :3] = for_own_shaders(colors[:, :3])
     shader = gpu.shader.from_builtin("SMOOTH_COLOR")
     flat = np.column_stack([positions, np.zeros(len(positions))]).astype(np.float32)
     return batch_for_shader(shader, "TRIS", {"pos": flat, "color": colors.astype(np.float32)})
