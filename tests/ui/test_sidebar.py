@@ -16,7 +16,7 @@ from fmqm_addon.blender.scene.target import target_of
 from fmqm_addon.blender.scene.triangle_count import triangle_count
 from fmqm_addon.ui import preferences
 from fmqm_addon.ui.panels.results import columns_for
-from fmqm_addon.ui.panels.sidebar import cut_in_the_middle, short_count
+from fmqm_addon.ui.panels.sidebar import cut_in_the_middle, short_count, text_width
 from fmqm_addon.ui.properties.rows import active_row, row_former, row_scores
 from tests.blender import scenes
 
@@ -43,9 +43,9 @@ def test_a_wide_sidebar_has_all_columns() -> None:
 
 
 def test_names_are_cut_in_the_middle() -> None:
-    assert cut_in_the_middle("Rock", 8) == "Rock"
-    cut = cut_in_the_middle("Cliff_Large_LOD3", 9)
-    assert len(cut) == 9 and cut.startswith("Clif") and cut.endswith("LOD3"[-4:])
+    assert cut_in_the_middle("Rock", 60) == "Rock"
+    cut = cut_in_the_middle("Cliff_Large_LOD3", 80)
+    assert cut.startswith("Clif") and cut.endswith("LOD3") and 60 < text_width(cut) <= 80
 
 
 @pytest.mark.parametrize(("count", "text"), [(512, "512"), (8_659, "8.7k"), (250_000, "250k"), (1_234_567, "1.2M")])

@@ -10,7 +10,7 @@ import bpy
 from ...comparison.judge import Judge
 from ...report.words import LABELS
 from ..operators.chain import FMQM_OT_lod_chain
-from .sidebar import Sidebar
+from .sidebar import Sidebar, fields
 
 
 class FMQM_PT_chain(Sidebar, bpy.types.Panel):  # noqa: N801
@@ -22,13 +22,15 @@ class FMQM_PT_chain(Sidebar, bpy.types.Panel):  # noqa: N801
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, chain = self.layout, context.scene.fmqm.chain
-        layout.use_property_split, layout.use_property_decorate = True, False
+        fields(layout, context)
         layout.prop(chain, "levels")
         column = layout.column(align=True)
         judge = LABELS[Judge[context.scene.fmqm.judge].column]
         for level in range(chain.levels):
-            column.prop(chain, "qualities", index=level, text=f"{judge} of LOD{level + 1}", slider=True)
-        layout.prop(chain, "name_original")
+            column.prop(chain, "qualities", index=level, text=f"LOD{level + 1} {judge}", slider=True)
+        row = layout.row()
+        row.use_property_split = False
+        row.prop(chain, "name_original")
         row = layout.row()
         row.operator_context = "INVOKE_DEFAULT"
         row.operator(FMQM_OT_lod_chain.bl_idname, icon="MOD_DECIM")

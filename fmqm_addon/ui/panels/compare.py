@@ -10,7 +10,9 @@ from ..operators.flip import FMQM_OT_flip
 from ..operators.loupe import FMQM_OT_loupe
 from ..view import flip, loupe
 from ..view.result import why_not
-from .sidebar import OfResult, wrapped
+from .sidebar import OfResult, beside, is_narrow, wrapped
+
+_KEY = 290  # pixels of a sidebar in which one of two buttons has room for its key
 
 
 class FMQM_PT_compare(OfResult, bpy.types.Panel):  # noqa: N801
@@ -25,11 +27,13 @@ class FMQM_PT_compare(OfResult, bpy.types.Panel):  # noqa: N801
             return
         area = context.area.as_pointer()
         has_loupe = loupe.shown is not None and loupe.shown.area == area
-        self.layout.operator(FMQM_OT_loupe.bl_idname, text=_with_key(FMQM_OT_loupe), icon="VIEWZOOM", depress=has_loupe)
+        name = FMQM_OT_loupe.bl_label if is_narrow(context) else _with_key(FMQM_OT_loupe)
+        self.layout.operator(FMQM_OT_loupe.bl_idname, text=name, icon="VIEWZOOM", depress=has_loupe)
         shown = flip.shown if flip.shown is not None and flip.shown.area == area else None
-        row = self.layout.row(align=True)
+        row = beside(self.layout, context)
         alone, wipes = shown is not None and shown.wipe is None, shown is not None and shown.wipe is not None
-        row.operator(FMQM_OT_flip.bl_idname, text=_with_key(FMQM_OT_flip), icon="FILE_REFRESH", depress=alone)
+        name = FMQM_OT_flip.bl_label if is_narrow(context, _KEY) else _with_key(FMQM_OT_flip)
+        row.operator(FMQM_OT_flip.bl_idname, text=name, icon="FILE_REFRESH", depress=alone)
         row.operator(FMQM_OT_flip.bl_idname, text="Wipe", icon="ARROW_LEFTRIGHT", depress=wipes).wipe = True
 
 

@@ -10,7 +10,7 @@ import bpy
 from ...comparison.judge import Judge
 from ...report.words import LABELS
 from ..operators.decimate import FMQM_OT_decimate
-from .sidebar import Sidebar
+from .sidebar import Sidebar, fields, switched
 
 
 class FMQM_PT_decimate(Sidebar, bpy.types.Panel):  # noqa: N801
@@ -22,19 +22,11 @@ class FMQM_PT_decimate(Sidebar, bpy.types.Panel):  # noqa: N801
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, decimate = self.layout, context.scene.fmqm.decimate
-        layout.use_property_split, layout.use_property_decorate = True, False
-        label = f"Target {LABELS[Judge[context.scene.fmqm.judge].column]}"
+        fields(layout, context)
+        label = f"{LABELS[Judge[context.scene.fmqm.judge].column]} Target"
         layout.prop(decimate, "target", text=label, slider=True)
-        row = layout.row(heading="Max Triangles")
-        row.prop(decimate, "limited", text="")
-        number = row.row()
-        number.active = decimate.limited
-        number.prop(decimate, "max_triangles", text="")
-        row = layout.row(heading="Smaller Textures")
-        row.prop(decimate, "textures", text="")
-        number = row.row()
-        number.active = decimate.textures
-        number.prop(decimate, "texture_target", text="", slider=True)
+        switched(layout, decimate, "limited", "max_triangles", "Max Triangles")
+        switched(layout, decimate, "textures", "texture_target", "Smaller Textures", slider=True)
         row = layout.row()
         row.operator_context = "INVOKE_DEFAULT"
         row.operator(FMQM_OT_decimate.bl_idname, icon="MOD_DECIM")

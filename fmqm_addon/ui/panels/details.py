@@ -25,7 +25,7 @@ from ..properties.rows import (
     row_stderr,
     settings_name,
 )
-from .sidebar import OfResult, wrapped
+from .sidebar import EDGES, ICON, OfResult, is_narrow, text_width, width, wrapped
 
 _SHORT_SPACE = {SPACE_LABELS["location"]: "Origins Aligned"}
 NOT_SEEN = "Normal maps, roughness and lighting are not part of FMQM"
@@ -43,7 +43,7 @@ class FMQM_PT_details(OfResult, bpy.types.Panel):  # noqa: N801
         if row is None:
             return
         column = self.layout.column(align=True)
-        _draw_scores(column, row)
+        _draw_scores(column, context, row)
         for label, text in _facts(row):
             split = column.split(factor=0.5, align=True)
             split.label(text=f"    {label}")
@@ -59,18 +59,20 @@ class FMQM_PT_details(OfResult, bpy.types.Panel):  # noqa: N801
         wrapped(note, context, NOT_SEEN)
 
 
-def _draw_scores(column: bpy.types.UILayout, row: FMQMRow) -> None:
+def _draw_scores(column: bpy.types.UILayout, context: bpy.types.Context, row: FMQMRow) -> None:
     scores, stderr, reverse = row_scores(row), row_stderr(row), row_reverse(row)
     if scores is None:
         return
     for name in LABELS:
         if name == "perceived":
             column.separator()
-        split = column.split(factor=0.5, align=True)
+        text = score_text(scores[name], stderr[name] if stderr and not is_narrow(context) else None)
+        room = width(context) - EDGES
+        split = column.split(factor=min(0.5, 1 - (text_width(text) + ICON / 2) / room), align=True)
         label = split.row()
         label.alignment = "LEFT"
         label.operator("fmqm.sort_rows", text=LABELS[name], emboss=False).column = name
-        split.label(text=score_text(scores[name], stderr[name] if stderr else None))
+        split.label(text=text)
     if reverse is None:
         return
     for judge in Judge:

@@ -12,7 +12,18 @@ from ..operators.inputs import reference_of
 from ..operators.measure import why_not
 from ..properties.items import FMQMItem, item_target
 from ..properties.scene import FMQMScene
-from .sidebar import CHARACTER, Sidebar, cut_in_the_middle, short_count, width, wrapped
+from .sidebar import (
+    ICON,
+    Sidebar,
+    beside,
+    cut_in_the_middle,
+    is_narrow,
+    list_width,
+    short_count,
+    width,
+    with_buttons,
+    wrapped,
+)
 
 _COUNT = 44  # pixels at scale 1, of the column of triangles
 
@@ -38,12 +49,13 @@ class FMQM_UL_compared(bpy.types.UIList):  # noqa: N801
         icon = "OUTLINER_COLLECTION"
         if isinstance(target, bpy.types.Object):
             icon = "OBJECT_DATA" if target.type == "MESH" else "EMPTY_DATA"
-        whole = width(context) - 94
-        split = layout.split(factor=1 - _COUNT / max(whole, 2 * _COUNT))
-        name = cut_in_the_middle(target.name, int((whole - _COUNT) / CHARACTER) - 3)
+        whole, beside_name = list_width(width(context)), 0 if is_narrow(context) else _COUNT
+        split = layout.split(factor=1 - beside_name / whole)
+        name = cut_in_the_middle(target.name, whole - beside_name - ICON)
         split.label(text=name, icon=icon, translate=False)
         count = triangle_count(target_of(target), context.view_layer.depsgraph)
-        split.label(text="" if count is None else short_count(count), translate=False)
+        if count is not None and beside_name:
+            split.label(text=short_count(count), translate=False)
 
 
 class FMQM_MT_compared(bpy.types.Menu):  # noqa: N801
@@ -64,13 +76,13 @@ class FMQM_PT_main(Sidebar, bpy.types.Panel):  # noqa: N801
         if reference_of(fmqm) is None and not fmqm.compared:
             wrapped(layout, context, "Select the LODs, then the original last, and press Use Selection", icon="INFO")
         self._draw_reference(layout, context, fmqm)
-        self._draw_compared(layout, fmqm)
+        self._draw_compared(layout, context, fmqm)
         self._draw_measure(layout, context, fmqm)
 
     def _draw_reference(self, layout: bpy.types.UILayout, context: bpy.types.Context, fmqm: FMQMScene) -> None:
         column = layout.column(align=True)
         column.operator("fmqm.find_lods", icon="VIEWZOOM")
-        row = column.row(align=True)
+        row = beside(column, context)
         row.operator("fmqm.use_selection")
         row.operator("fmqm.own_modifiers")
         column = layout.column(align=True)
@@ -78,19 +90,19 @@ class FMQM_PT_main(Sidebar, bpy.types.Panel):  # noqa: N801
         count = None
         if original is not None:
             count = triangle_count(target_of(original, fmqm.bare_reference), context.view_layer.depsgraph)
-        column.label(text="Original" if count is None else f"Original: {count:,} triangles")
+        triangles = "" if count is None else f": {count:,}" if is_narrow(context) else f": {count:,} triangles"
+        column.label(text=f"Original{triangles}")
         row = column.row(align=True)
         row.prop(fmqm, "reference_kind", expand=True, icon_only=True)
         row.prop(fmqm, "reference" if fmqm.reference_kind == "OBJECT" else "reference_collection", text="")
         if fmqm.bare_reference:
             column.prop(fmqm, "bare_reference")
 
-    def _draw_compared(self, layout: bpy.types.UILayout, fmqm: FMQMScene) -> None:
+    def _draw_compared(self, layout: bpy.types.UILayout, context: bpy.types.Context, fmqm: FMQMScene) -> None:
         column = layout.column(align=True)
         column.label(text="LODs")
-        row = column.row()
-        row.template_list("FMQM_UL_compared", "", fmqm, "compared", fmqm, "compared_index", rows=3)
-        side = row.column(align=True)
+        table, side = with_buttons(column, context)
+        table.template_list("FMQM_UL_compared", "", fmqm, "compared", fmqm, "compared_index", rows=3)
         side.operator("fmqm.add_selected", text="", icon="ADD")
         side.operator("fmqm.remove_compared", text="", icon="REMOVE")
         side.operator("fmqm.swap", text="", icon="FILE_REFRESH")
@@ -108,7 +120,7 @@ class FMQM_PT_main(Sidebar, bpy.types.Panel):  # noqa: N801
         if finer:
             wrapped(layout, context, f"{finer} has more triangles than the original: swap them?", icon="ERROR")
         layout.prop(fmqm.settings, "preset", text="")
-        row = layout.split(factor=0.75, align=True)
+        row = layout.column(align=True) if is_narrow(context) else layout.split(factor=0.75, align=True)
         row.scale_y = 1.5
         row.operator_context = "INVOKE_DEFAULT"
         row.operator("fmqm.measure", icon="DRIVER_DISTANCE")

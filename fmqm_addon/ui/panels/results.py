@@ -24,7 +24,19 @@ from ..properties.rows import (
     row_scores,
 )
 from ..properties.scene import FMQMScene
-from .sidebar import CHARACTER, Sidebar, cut_in_the_middle, short_count, width, wrapped
+from .sidebar import (
+    EDGES,
+    ICON,
+    Sidebar,
+    beside,
+    cut_in_the_middle,
+    is_narrow,
+    list_width,
+    short_count,
+    width,
+    with_buttons,
+    wrapped,
+)
 from .swatches import swatch
 
 
@@ -53,7 +65,7 @@ class FMQM_UL_rows(bpy.types.UIList):  # noqa: N801
         cells = _cells(row, scores)
         for (column, share), place in _split(layout, columns_for(width(context), context.scene.fmqm.judge)):
             if column == "name":
-                text = cut_in_the_middle(row.name, int(share / CHARACTER) - (2 if icon == "NONE" else 5))
+                text = cut_in_the_middle(row.name, share - (_PADDING if icon == "NONE" else ICON))
                 place.label(text=text, icon=icon, translate=False)
             elif column == "bar" and scores is not None:
                 place.progress(factor=scores["perceived"], text="")
@@ -82,7 +94,8 @@ _TABLE = (
     ("bar", "", 40, 400),
 )
 _SENTENCES = 2  # of the explanation that stand with the verdict
-_BESIDE = 94  # of the list: what is left and right of the columns
+_PADDING = 18  # of a label
+_LABEL = 92  # of a feature's name with its square
 
 
 def columns_for(whole: float, judge_name: str) -> list[tuple[str, float]]:
@@ -94,7 +107,7 @@ def columns_for(whole: float, judge_name: str) -> list[tuple[str, float]]:
         for name, _, wide, least in _TABLE
         if (name == judge if narrow and name in ("FMQM", "perceived") else whole >= least)
     ]
-    return [("name", max(whole - _BESIDE - sum(wide for _, wide in shown), 40.0)), *shown]
+    return [("name", max(list_width(whole) - sum(wide for _, wide in shown), 40.0)), *shown]
 
 
 def _split(
@@ -135,25 +148,24 @@ class FMQM_PT_results(Sidebar, bpy.types.Panel):  # noqa: N801
         chosen = active_row(context.scene)
         if chosen is not None:
             _draw_verdict(layout, context, fmqm, chosen)
-        layout.row().prop(fmqm, "judge", expand=True)
-        row = layout.row()
-        table = row.column(align=True)
+        beside(layout, context).prop(fmqm, "judge", expand=True)
+        table, side = with_buttons(layout, context)
         _draw_heads(table, context)
         count = min(max(len(fmqm.rows), 2), 8)
         table.template_list("FMQM_UL_rows", "", fmqm, "rows", fmqm, "row_index", rows=count)
-        side = row.column(align=True)
         side.operator("fmqm.sort_rows", text="", icon="SORTSIZE").column = Judge[fmqm.judge].column
         side.operator("fmqm.remove_row", text="", icon="REMOVE")
         side.menu("FMQM_MT_results", text="", icon="DOWNARROW_HLT")
         if chosen is not None and not all(comparable(chosen, other) for other in fmqm.rows if row_scores(other)):
             wrapped(layout, context, "Scores in grey were measured at other settings: do not compare", icon="INFO")
-        row = layout.row()
+        row = beside(layout, context, align=False)
         row.operator_context = "INVOKE_DEFAULT"
         row.operator("fmqm.screen_sizes")
         row.operator("fmqm.report")
-        row = layout.row(align=True)
-        row.operator_context = "INVOKE_DEFAULT"
+        row = layout.column(align=True) if is_narrow(context) else layout.split(factor=0.25, align=True)
         row.label(text="Save")
+        row = row.row(align=True)
+        row.operator_context = "INVOKE_DEFAULT"
         for kind in ("json", "csv", "npz"):
             row.operator("fmqm.save_results", text=kind.upper()).file_format = kind
 
@@ -195,7 +207,8 @@ def _draw_verdict(layout: bpy.types.UILayout, context: bpy.types.Context, fmqm: 
         split.label(text=f"{score_text(scores[judge.column])}{was}")
     bars = box.column(align=True)
     for name in Judge[fmqm.judge].features:
-        split = bars.split(factor=0.5)
+        share = max(0.5, _LABEL / (width(context) - EDGES))
+        split = bars.column() if is_narrow(context) else bars.split(factor=share)
         label = split.row()
         label.alignment = "LEFT"
         label.operator("fmqm.sort_rows", text=LABELS[name], emboss=False, icon_value=swatch(scores[name])).column = name

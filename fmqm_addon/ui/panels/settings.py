@@ -8,7 +8,7 @@ from typing import ClassVar
 import bpy
 from bl_ui.utils import PresetPanel
 
-from .sidebar import Sidebar
+from .sidebar import Sidebar, fields
 
 
 class FMQM_PT_presets(PresetPanel, bpy.types.Panel):  # noqa: N801
@@ -30,8 +30,7 @@ class FMQM_PT_settings(Sidebar, bpy.types.Panel):  # noqa: N801
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, settings = self.layout, context.scene.fmqm.settings
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        fields(layout, context)
         layout.prop(settings, "preset")
         column = layout.column()
         column.prop(settings, "space")
@@ -55,8 +54,7 @@ class FMQM_PT_metric(Sidebar, bpy.types.Panel):  # noqa: N801
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, settings = self.layout, context.scene.fmqm.settings
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        fields(layout, context)
         column = layout.column(align=True)
         for name in ("samples", "patches", "color_units"):
             column.prop(settings, name)

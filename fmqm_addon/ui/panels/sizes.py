@@ -11,7 +11,9 @@ from ...report.records import size_text
 from ..operators.screen_sizes import FMQM_OT_copy_sizes
 from ..properties.rows import row_screen_size
 from ..sizes import engine_text, levels_of, sized_rows
-from .sidebar import CHARACTER, Sidebar, cut_in_the_middle, width, wrapped
+from .sidebar import EDGES, Sidebar, cut_in_the_middle, fields, is_narrow, width, wrapped
+
+_SIZE = 80  # pixels at scale 1, of the column of sizes
 
 
 class FMQM_PT_sizes(Sidebar, bpy.types.Panel):  # noqa: N801
@@ -28,10 +30,11 @@ class FMQM_PT_sizes(Sidebar, bpy.types.Panel):  # noqa: N801
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, sizes = self.layout, context.scene.fmqm.sizes
-        table = layout.column(align=True)
+        table, whole = layout.column(align=True), width(context) - EDGES
+        beside_name = 0 if is_narrow(context) else _SIZE
         for row in sized_rows(context.scene):
-            split = table.split(factor=0.5)
-            split.label(text=cut_in_the_middle(row.name, int(width(context) / 2 / CHARACTER) - 4), translate=False)
+            split = table.split(factor=1 - beside_name / whole) if beside_name else table
+            split.label(text=cut_in_the_middle(row.name, whole - beside_name), translate=False)
             split.label(text=f"{size_text(row_screen_size(row) or {}, sizes.transition)} px")
         for level in levels_of(context.scene):
             if level.why:
@@ -40,7 +43,7 @@ class FMQM_PT_sizes(Sidebar, bpy.types.Panel):  # noqa: N801
         note.active = False
         wrapped(note, context, "Pixels that the diagonal of the original's box spans")
         layout.row().prop(sizes, "transition", expand=True)
-        layout.use_property_split, layout.use_property_decorate = True, False
+        fields(layout, context)
         layout.prop(sizes, "engine")
         column = layout.column(align=True)
         column.prop(sizes, "height")

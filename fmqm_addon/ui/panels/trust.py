@@ -12,7 +12,7 @@ from ..properties.rows import (
     active_row,
     row_trust,
 )
-from .sidebar import Sidebar, room, wrapped
+from .sidebar import Sidebar, fits, wrapped
 
 
 class FMQM_PT_trust(Sidebar, bpy.types.Panel):  # noqa: N801
@@ -45,9 +45,8 @@ def _draw_fact(layout: bpy.types.UILayout, context: bpy.types.Context, line: Lin
     value = " / ".join(dict.fromkeys(line.values))  # one where both have the same: the sidebar is narrow
     if unit.partition(" ")[0] in label.split():  # vertices welded are vertices
         unit = ""
-    space = room(context, 40) - len(label) - 2
     label, whole = label[:1].upper() + label[1:], f"{value} {unit}".strip()
-    if len(value) > space:
+    if not fits(context, label, value):
         layout.label(text=label)
         _draw_below(layout, context, whole)
         return
@@ -55,8 +54,9 @@ def _draw_fact(layout: bpy.types.UILayout, context: bpy.types.Context, line: Lin
     row.label(text=label)
     right = row.row(align=True)
     right.alignment = "RIGHT"
-    right.label(text=whole if len(whole) <= space else value, translate=False)
-    if len(whole) > space:
+    is_short = fits(context, label, whole)
+    right.label(text=whole if is_short else value, translate=False)
+    if not is_short:
         note = layout.column(align=True)
         note.active = False
         _draw_below(note, context, unit)

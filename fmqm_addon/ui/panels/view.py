@@ -22,18 +22,27 @@ from ..operators.view import (
 )
 from ..properties.rows import active_row
 from ..view.result import look_of
-from .sidebar import OfResult
+from .sidebar import OfResult, beside, fields, list_width, switched, text_width, width, wrapped
+
+_LONG_WORDS = 280  # pixels of a sidebar in which two buttons with icons have room for their words
+_SCORE, _BLAME, _NUMBER = 46, 80, 40  # pixels at scale 1, of the columns of the worst places
 
 
 class FMQM_UL_worst(bpy.types.UIList):  # noqa: N801
-    def draw_item(  # Blender counts the arguments
-        self, _context: Any, layout: Any, _data: Any, item: Any, _icon: int, _active: Any, _property: str
+    def draw_item(
+        self, context: bpy.types.Context, layout: Any, _data: Any, item: Any, _icon: int, _active: Any, _property: str
     ) -> None:
-        split = layout.split(factor=0.24)
+        """The score, what is lowest there, and, where there is room, the patch."""
+        room = list_width(width(context))
+        split = layout.split(factor=_SCORE / room)
         split.label(text=score_text(item.score, places=3))
-        split = split.split(factor=0.72)
-        split.label(text=item.blame)
-        split.label(text=f"#{item.patch}")
+        rest = room - _SCORE
+        if rest > _BLAME + _NUMBER:
+            split = split.split(factor=1 - _NUMBER / rest)
+        fitting = text_width(item.blame) + 12 < rest
+        split.label(text=item.blame if fitting else item.blame.rpartition(" ")[0])
+        if rest > _BLAME + _NUMBER:
+            split.label(text=f"#{item.patch}")
 
     def draw_filter(self, _context: bpy.types.Context, _layout: Any) -> None:
         """Twenty rows in their order need no filter."""
@@ -46,9 +55,9 @@ class FMQM_PT_look(OfResult, bpy.types.Panel):  # noqa: N801
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, look = self.layout, look_of(context.scene)
-        layout.use_property_split, layout.use_property_decorate = True, False
+        fields(layout, context)
         _say_if_gone(layout, context)
-        _switch(layout, look, "show")
+        _switch(layout, context, look, "show")
         column = layout.column()
         column.active = look.show != "OFF"
         column.prop(look, "layer")
@@ -57,20 +66,16 @@ class FMQM_PT_look(OfResult, bpy.types.Panel):  # noqa: N801
             pair = column.column(align=True)
             pair.prop(look, "low", slider=True)
             pair.prop(look, "high", slider=True)
-        row = column.row(heading="Only Below")
-        row.prop(look, "only_below", text="")
-        number = row.row()
-        number.active = look.only_below
-        number.prop(look, "below", text="", slider=True)
+        switched(column, look, "only_below", "below", "Only Below", slider=True)
         column.label(text="Show On")
-        _switch(column, look, "place")
+        _switch(column, context, look, "place")
         if look.show == "POINTS":
             column.prop(look, "point_size", slider=True)
         row = layout.row()
         row.use_property_split = False
         row.prop(look, "show_after")
         layout.operator(FMQM_OT_probe.bl_idname, icon="EYEDROPPER")
-        row = layout.row(align=True)
+        row = beside(layout, context, _LONG_WORDS)
         row.operator(FMQM_OT_keep.bl_idname, icon="FAKE_USER_ON")
         row.operator(FMQM_OT_clear.bl_idname, icon="TRASH")
 
@@ -85,7 +90,7 @@ class FMQM_PT_worst(OfResult, bpy.types.Panel):  # noqa: N801
         _say_if_gone(layout, context)
         if len(look.worst):
             layout.template_list("FMQM_UL_worst", "", look, "worst", look, "worst_index", rows=4, maxrows=8)
-        row = layout.row(align=True)
+        row = beside(layout, context)
         row.operator(FMQM_OT_worst_step.bl_idname, text="Previous", icon="TRIA_LEFT").step = -1
         row.operator(FMQM_OT_worst_step.bl_idname, text="Next", icon="TRIA_RIGHT").step = 1
         layout.operator(FMQM_OT_worst_all.bl_idname)
@@ -99,19 +104,19 @@ class FMQM_PT_ncf(OfResult, bpy.types.Panel):  # noqa: N801
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, look = self.layout, look_of(context.scene)
-        layout.use_property_split, layout.use_property_decorate = True, False
+        fields(layout, context)
         _say_if_gone(layout, context)
         column = layout.column(align=True)
         column.label(text="Units of One Sample")
         column.operator(FMQM_OT_unit_pick.bl_idname, icon="EYEDROPPER")
-        row = column.row(align=True)
+        row = beside(column, context)
         row.operator(FMQM_OT_unit_step.bl_idname, text="Previous", icon="TRIA_LEFT").step = -1
         row.operator(FMQM_OT_unit_step.bl_idname, text="Next", icon="TRIA_RIGHT").step = 1
         column = layout.column()
         column.operator(FMQM_OT_slice.bl_idname, icon="MESH_PLANE", depress=look.show_slice)
         column = column.column()
         column.active = look.show_slice
-        column.row().prop(look, "slice_axis", expand=True)
+        beside(column, context).prop(look, "slice_axis", expand=True)
         column.prop(look, "slice_offset", slider=True)
         column.prop(look, "slice_layer")
         column.prop(look, "slice_resolution")
@@ -119,15 +124,15 @@ class FMQM_PT_ncf(OfResult, bpy.types.Panel):  # noqa: N801
         column.operator(FMQM_OT_shells.bl_idname, icon="MOD_THICKNESS", depress=look.show_shells)
         column = column.column()
         column.active = look.show_shells
-        column.row().prop(look, "shell_field", expand=True)
-        column.row().prop(look, "shell_layout", expand=True)
+        beside(column, context).prop(look, "shell_field", expand=True)
+        beside(column, context).prop(look, "shell_layout", expand=True)
         column.prop(look, "shell_distance")
         column.prop(look, "shell_points")
 
 
-def _switch(layout: bpy.types.UILayout, look: Any, name: str) -> None:
+def _switch(layout: bpy.types.UILayout, context: bpy.types.Context, look: Any, name: str) -> None:
     """A choice of buttons over the whole width, where their names are not cut."""
-    row = layout.row()
+    row = beside(layout, context)
     row.use_property_split = False
     row.prop(look, name, expand=True)
 
@@ -135,7 +140,7 @@ def _switch(layout: bpy.types.UILayout, look: Any, name: str) -> None:
 def _say_if_gone(layout: Any, context: bpy.types.Context) -> None:
     row = active_row(context.scene)
     if row is not None and not row.error and session.get(row.uid) is None:
-        layout.label(text="Samples are gone: Measure Again", icon="INFO")
+        wrapped(layout, context, "Samples are gone: Measure Again", icon="INFO")
 
 
 CLASSES: tuple[type, ...] = (FMQM_UL_worst, FMQM_PT_look, FMQM_PT_worst, FMQM_PT_ncf)
