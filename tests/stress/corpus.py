@@ -12,6 +12,7 @@ from __future__ import annotations
 import json
 import os
 import resource
+import signal
 import subprocess
 import sys
 import tempfile
@@ -28,7 +29,8 @@ from tests.blender.script import COLUMNS, SCORE
 ROOT = Path(__file__).resolve().parents[2]
 SHARED = ROOT.parent / "shared" / "data"
 MEMORY = 8 * 2**30  # bytes of address space of a process
-SECONDS = 180.0  # many more than a file takes: machines are busy
+SECONDS = 90  # of processors, many more than a file takes
+WAIT = 1800.0  # seconds: machines are busy
 FLAGS = ("--samples", "320", "--patches", "5", "--color-units", "10", "--quiet", "--json", "-")
 
 
@@ -46,16 +48,18 @@ def real_files(folders: Iterable[Path] = (SHARED / "hostile", SHARED / "cases" /
     return sorted(p for each in folders for p in each.rglob("*") if p.suffix.lower() in SUFFIXES and p.is_file())
 
 
-def judge(path: Path, seconds: float = SECONDS) -> tuple[str, str]:
+def judge(path: Path) -> tuple[str, str]:
     """What became of a file: "identity", "refused", or a kind of trouble; and the words for it."""
     command = [sys.executable, str(SCORE), str(path), str(path), *FLAGS]
     began = time.monotonic()
     try:
         done = subprocess.run(
-            command, capture_output=True, timeout=seconds, check=False, preexec_fn=_limit, stdin=subprocess.DEVNULL
+            command, capture_output=True, timeout=WAIT, check=False, preexec_fn=_limit, stdin=subprocess.DEVNULL
         )
     except subprocess.TimeoutExpired:
-        return "hang", f"not done within {seconds:g} s"
+        return "hang", f"not done within {WAIT:g} s"
+    if done.returncode == -signal.SIGXCPU:
+        return "hang", f"not done within {SECONDS} s of processors"
     took = f"{time.monotonic() - began:.1f} s"
     said, out = (each.decode(errors="replace") for each in (done.stderr, done.stdout))
     if "Traceback (most recent call last)" in said + out:
@@ -83,6 +87,7 @@ def _judge_scores(out: str, took: str) -> tuple[str, str]:
 
 def _limit() -> None:
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS + 5))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
