@@ -8,10 +8,8 @@ has changed; after a short rest a timer works in small steps, and not while the 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 
 import bpy
-from bpy.app.handlers import persistent
 
 from ..blender.display import viewport
 from ..blender.materials.types import Reading
@@ -24,7 +22,7 @@ from ..metric.settings import PRESETS, Settings
 from ..metric.stepper import Stepper
 from ..report.numbers import score_text
 from ..report.words import LABELS, PRESET_LABELS
-from . import session
+from . import handlers, session
 from .operators.inputs import reference_of
 from .properties.items import item_target
 from .properties.rows import active_row, row_targets
@@ -191,8 +189,7 @@ def turn_on(settings: Settings = _QUICK) -> None:
     current, notice = Live(settings), ""
     if bpy.app.background:
         return
-    for name, handler in _HANDLERS:
-        getattr(bpy.app.handlers, name).append(handler)
+    handlers.add(_HANDLERS)
     bpy.app.timers.register(_run, first_interval=0)
     viewport.redraw()
 
@@ -207,10 +204,7 @@ def turn_off(why: str = "") -> None:
     if current is not None:
         current.stop()
     current, notice = None, why
-    for name, handler in _HANDLERS:
-        handlers = getattr(bpy.app.handlers, name)
-        if handler in handlers:
-            handlers.remove(handler)
+    handlers.remove(_HANDLERS)
     for timer in (_run, _forget_notice):
         if bpy.app.timers.is_registered(timer):
             bpy.app.timers.unregister(timer)
@@ -275,29 +269,24 @@ def _forget_notice() -> None:
     viewport.redraw()
 
 
-def _kept(handler: Callable[..., None]) -> Callable[..., None]:
-    kept: Callable[..., None] = persistent(handler)
-    return kept
-
-
-@_kept
+@handlers.kept
 def _on_change(_: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     if any(isinstance(update.id, WATCHED) for update in depsgraph.updates):
         touch()
 
 
-@_kept
+@handlers.kept
 def _on_undo(*_: object) -> None:
     touch()
 
 
-@_kept
+@handlers.kept
 def _before_load(*_: object) -> None:
     if current is not None:
         current.stop()
 
 
-@_kept
+@handlers.kept
 def _after_load(*_: object) -> None:
     touch()  # which begins a timer anew: opening a file has ended it
 

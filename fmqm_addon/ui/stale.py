@@ -8,15 +8,13 @@ There is nobody to see marks without a window, and a handler left in bpy 4.5 kee
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
 
 import bpy
-from bpy.app.handlers import persistent
 
 from ..blender.scene.fingerprint import fingerprint, in_edit_mode
 from ..blender.scene.node_queries import sweep
 from ..comparison.alignment import location_counts
-from . import session
+from . import handlers, session
 from .properties.items import item_target, kept
 from .properties.rows import row_targets
 from .view.shown import forget_removed, put_away
@@ -88,13 +86,7 @@ def soon() -> None:
     bpy.app.timers.register(_check_all, first_interval=_DELAY)
 
 
-def _kept(handler: Callable[..., None]) -> Callable[..., None]:
-    """Blender's decorator, with types: the handler outlives the opening of another file."""
-    kept: Callable[..., None] = persistent(handler)
-    return kept
-
-
-@_kept
+@handlers.kept
 def _on_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     forget_removed()
     if not scene.fmqm.rows:
@@ -105,27 +97,27 @@ def _on_change(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
             return
 
 
-@_kept
+@handlers.kept
 def _on_undo(*_: object) -> None:
     sweep()  # the step may be one of during a measurement
     forget_removed()
     soon()
 
 
-@_kept
+@handlers.kept
 def _before_load(*_: object) -> None:
     _stop_job()
     put_away()
 
 
-@_kept
+@handlers.kept
 def _after_load(*_: object) -> None:
     sweep()  # what was saved on its own during a measurement
     session.clear()
     soon()
 
 
-@_kept
+@handlers.kept
 def _before_save(*_: object) -> None:
     for scene in bpy.data.scenes:
         forget_deleted(scene)
@@ -147,17 +139,12 @@ _HANDLERS = (
 
 
 def register() -> None:
-    if bpy.app.background:
-        return
-    for name, handler in _HANDLERS:
-        getattr(bpy.app.handlers, name).append(handler)
+    if not bpy.app.background:
+        handlers.add(_HANDLERS)
 
 
 def unregister() -> None:
-    for name, handler in reversed(_HANDLERS):
-        handlers = getattr(bpy.app.handlers, name)
-        if handler in handlers:
-            handlers.remove(handler)
+    handlers.remove(_HANDLERS)
     _stop_job()  # which asks for a check
     if bpy.app.timers.is_registered(_check_all):
         bpy.app.timers.unregister(_check_all)

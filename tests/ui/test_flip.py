@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from types import SimpleNamespace
-from typing import Any
 
 import bpy
 import numpy as np
@@ -13,6 +12,7 @@ import pytest
 
 from fmqm_addon.ui import session, stale
 from fmqm_addon.ui.operators.flip import FMQM_OT_flip
+from fmqm_addon.ui.operators.view_tool import ViewTool
 from fmqm_addon.ui.view import flip, heat, loupe
 from tests.ui.test_look import measured, scene  # noqa: F401  the fixtures
 
@@ -29,8 +29,10 @@ def opened(scene: bpy.types.Scene, monkeypatch: pytest.MonkeyPatch) -> Iterator[
         flip.close()
 
 
-class Running:
-    """The operator while it runs, as far as its modal function needs it."""
+class Running(ViewTool):
+    """The operator while it runs."""
+
+    is_on, act, end = FMQM_OT_flip.is_on, FMQM_OT_flip.act, FMQM_OT_flip.end
 
     def __init__(self, shown: flip.Flip) -> None:
         self._area, self._shown, self._drags = AREA, shown, False
@@ -38,11 +40,8 @@ class Running:
 
     def gets(self, kind: str, value: str = "PRESS", x: int = 500) -> str:
         event = SimpleNamespace(type=kind, value=value, mouse_x=x, mouse_y=300, ctrl=False, shift=False, alt=False)
-        (answer,) = FMQM_OT_flip.modal(self, self.context, event)
+        (answer,) = self.modal(self.context, event)
         return answer
-
-    def _finish(self, context: Any) -> set[str]:
-        return FMQM_OT_flip._finish(self, context)
 
 
 def test_both_are_sampled_coarse_to_fine(opened: flip.Flip, measured: session.Measured) -> None:  # noqa: F811
@@ -74,8 +73,9 @@ def test_keys_turn_and_a_drag_wipes(opened: flip.Flip) -> None:
     assert running.gets("LEFTMOUSE", x=50) == "PASS_THROUGH", "beside the view buttons go on working"
     assert running.gets("MIDDLEMOUSE") == "PASS_THROUGH", "and the view can be turned"
     assert running.gets("F") == "RUNNING_MODAL" and opened.wipe is None
+    work = opened.work
     assert running.gets("ESC") == "FINISHED" and flip.shown is None
-    assert not opened.work.step(), "its work is stopped"
+    assert not work.step(), "its work is stopped"
 
 
 def test_another_file_ends_both_tools(opened: flip.Flip) -> None:

@@ -17,6 +17,7 @@ from fmqm_addon.report.render import Camera, render
 from fmqm_addon.report.visual.worst import patch_view
 from fmqm_addon.ui import session
 from fmqm_addon.ui.operators.loupe import FMQM_OT_loupe
+from fmqm_addon.ui.operators.view_tool import ViewTool
 from fmqm_addon.ui.view import loupe, panes, sight, worst
 from fmqm_addon.ui.view.result import why_not
 from tests.ui.test_look import measured, scene  # noqa: F401  the fixtures
@@ -98,14 +99,17 @@ def test_what_is_out_of_date_is_not_shown(opened: loupe.Loupe) -> None:
 def test_closing_stops_the_work_and_nothing_is_left(opened: loupe.Loupe) -> None:
     kinds = ("objects", "meshes", "materials", "images", "scenes", "node_groups")
     before = [len(getattr(bpy.data, kind)) for kind in kinds]
-    opened.work.step()
+    work = opened.work
+    work.step()
     loupe.close()
-    assert loupe.shown is None and not opened.work.step()
+    assert loupe.shown is None and not work.step()
     assert [len(getattr(bpy.data, kind)) for kind in kinds] == before
 
 
-class Running:
-    """The operator while it runs, as far as its modal function needs it."""
+class Running(ViewTool):
+    """The operator while it runs."""
+
+    is_on, act, end = FMQM_OT_loupe.is_on, FMQM_OT_loupe.act, FMQM_OT_loupe.end
 
     def __init__(self, shown: loupe.Loupe) -> None:
         region = SimpleNamespace(type="WINDOW", x=0, y=0, width=800, height=600)
@@ -115,14 +119,11 @@ class Running:
 
     def gets(self, kind: str, value: str = "PRESS") -> str:
         event = SimpleNamespace(type=kind, value=value, mouse_x=400, mouse_y=300)
-        (answer,) = FMQM_OT_loupe.modal(self, self.context, event)
+        (answer,) = self.modal(self.context, event)
         return answer
 
     def _move(self, *_: object) -> None:
         self.moved += 1
-
-    def _finish(self, context: Any) -> set[str]:
-        return FMQM_OT_loupe._finish(self, context)
 
 
 def test_clicks_hold_the_place_keys_step_and_escape_closes(opened: loupe.Loupe) -> None:

@@ -78,7 +78,7 @@ def loupe_seen() -> None:
     EXPECTED["loupe lod"] = render(measured.comparison.distorted, camera, size)
     EXPECTED["loupe heat"] = shown.pictures[2].pixels
     REPORT["loupe"] = {"place": shown.place, "side": shown.side, "pad": ours("ui.view.ink").Ink().px(loupe._PAD)}
-    REPORT["longest step"] = loupe.longest_step
+    REPORT["longest step"] = shown.longest_step
 
 
 def open_flip() -> None:

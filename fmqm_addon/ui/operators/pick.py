@@ -5,76 +5,42 @@ from __future__ import annotations
 
 import bpy
 
-from ...metric.errors import FMQMError
 from ..view import heat, units
 from ..view.result import look_of
-from .polls import allowed, no_viewport
+from .polls import no_samples
+from .view_tool import At, ViewTool
 
 _REACH = 14  # pixels around the mouse in which a sample is picked
-_STATUS = "Click: Choose Sample    Esc, Right Click: Finish"
 
 
-class FMQM_OT_unit_pick(bpy.types.Operator):  # noqa: N801
+class FMQM_OT_unit_pick(ViewTool, bpy.types.Operator):  # noqa: N801
     bl_idname = "fmqm.unit_pick"
     bl_label = "Pick Sample"
     bl_description = "Click on points in the view to see the normal and the tangent unit of the sample there"
-    bl_options: set[str] = set()
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return allowed(cls, no_viewport(context))
+    status = "Click: Choose Sample    Esc, Right Click: Finish"
 
-    def invoke(self, context: bpy.types.Context, _: bpy.types.Event) -> set[str]:
-        self._area = context.area
+    def begin(self, context: bpy.types.Context) -> bool:
         look_of(context.scene).show = heat.POINTS
         context.window.cursor_modal_set("CROSSHAIR")
-        context.workspace.status_text_set(_STATUS)
-        context.window_manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
+        return True
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        self.report({"ERROR"}, "Picking needs the mouse; use Next Sample")
-        return {"CANCELLED"}
+    def is_on(self, context: bpy.types.Context) -> bool:
+        return not no_samples(context)  # the row may have been cleared meanwhile
 
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        if event.type in {"ESC", "RIGHTMOUSE", "RET"}:
-            return self._finish(context)
-        if event.type != "LEFTMOUSE" or event.value != "PRESS":
-            return {"PASS_THROUGH"}
-        region = next((r for r in self._area.regions if r.type == "WINDOW"), None)
-        if region is None or not holds(self._area, region, event):
-            return {"PASS_THROUGH"}  # buttons go on working
-        at = (event.mouse_x - region.x, event.mouse_y - region.y)
+    def act(
+        self, context: bpy.types.Context, event: bpy.types.Event, region: bpy.types.Region, at: At, inside: bool
+    ) -> bool:
+        if event.type != "LEFTMOUSE" or event.value != "PRESS" or not inside:
+            return False
         reach = _REACH * context.preferences.system.ui_scale
-        try:
-            view = self._area.spaces.active.region_3d
-            sample = units.nearest_sample(context.scene, region, view, at, reach)
-            if sample is not None:
-                units.show_unit(context.scene, sample)
-        except FMQMError as reason:  # the row was cleared meanwhile
-            self.report({"WARNING"}, str(reason))
-            return self._finish(context)
-        return {"RUNNING_MODAL"}
+        sample = units.nearest_sample(context.scene, region, self._area.spaces.active.region_3d, at, reach)
+        if sample is not None:
+            units.show_unit(context.scene, sample)
+        return True
 
-    def cancel(self, context: bpy.types.Context) -> None:
-        self._finish(context)
-
-    def _finish(self, context: bpy.types.Context) -> set[str]:
+    def end(self, context: bpy.types.Context) -> None:
         context.window.cursor_modal_restore()
-        context.workspace.status_text_set(None)
-        return {"FINISHED"}
-
-
-def holds(area: bpy.types.Area, window: bpy.types.Region, event: bpy.types.Event) -> bool:
-    """Whether the mouse is in the view and not over a toolbar or the sidebar."""
-
-    def within(region: bpy.types.Region) -> bool:
-        return (
-            region.x <= event.mouse_x < region.x + region.width and region.y <= event.mouse_y < region.y + region.height
-        )
-
-    others = (region for region in area.regions if region != window and region.width > 1 and region.height > 1)
-    return within(window) and not any(within(region) for region in others)
 
 
 CLASSES = (FMQM_OT_unit_pick,)

@@ -41,7 +41,7 @@ from .swatches import swatch
 
 
 class FMQM_UL_rows(bpy.types.UIList):  # noqa: N801
-    """A table of the LODs: what does not fit into a narrow sidebar is left out, never cut. Grey at other settings."""
+    """A table of the LODs. In a narrow sidebar columns are left out, no score is cut. Grey ones have other settings."""
 
     def draw_item(
         self,
@@ -58,7 +58,7 @@ class FMQM_UL_rows(bpy.types.UIList):  # noqa: N801
             icon = "CANCEL"
         elif row.uid in session.stale:
             icon = "FILE_REFRESH"
-        elif row.warnings:
+        elif row.warnings and not is_narrow(context):
             icon = "ERROR"
         scores, chosen = row_scores(row), active_row(context.scene)
         layout.active = chosen is None or comparable(row, chosen)

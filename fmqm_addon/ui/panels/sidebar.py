@@ -13,6 +13,7 @@ from ..properties.rows import active_row, row_scores
 
 NARROW = 215  # of the sidebar: below it, what stands side by side elsewhere stands one below the other
 ICON = 34  # of a label, with what is left and right of it
+_BEFORE = 20  # of an icon alone
 _FONT = 0
 EDGES = 76  # of the sidebar: what is left and right of a label in a box
 _LIST, _BUTTONS = 66, 28  # the same of the rows of a list, and of the buttons beside one
@@ -99,7 +100,7 @@ def wrapped(
     column = layout.column(align=True)
     column.scale_y = 0.8
     has_icon = icon != "NONE" or icon_value != 0
-    for number, line in enumerate(_lines(text, width(context) - EDGES - (ICON if has_icon else 0))):
+    for number, line in enumerate(_lines(text, width(context) - EDGES - (_BEFORE if has_icon else 0))):
         if number == 0 and icon_value:
             column.label(text=line, icon_value=icon_value)
         else:

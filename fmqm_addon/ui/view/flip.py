@@ -8,7 +8,6 @@ another object in it would need another scene. Nothing of the file is moved, hid
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,6 +15,7 @@ import bpy
 import gpu
 from mathutils import Matrix
 
+from ...blender.display import viewport
 from ...blender.display.inset import draw_texture
 from ...blender.display.sampled_mesh import SampledMesh
 from ...metric.stepper import Stepper, Work, as_part
@@ -26,48 +26,41 @@ from ..properties.rows import active_row
 from . import heat
 from .ink import Ink, box, free_part
 from .result import showable, why_not
+from .tool import Tool, soon
 
 PLACES = (60_000, 2_000_000)  # at which each of the two is colored: soon, and then
 FINER = 2  # pixels of the images for one of the view, along each side: edges are smooth
 _MOST_PIXELS = 1 << 23  # of an image; beyond, it is as large as the view
-SLICE = 0.03  # seconds of work of a tick
 _PAD, _LINE = 10, 18
 
 
 @dataclass
-class Flip:
+class Flip(Tool):
     """What is shown of the two.
 
     Attributes:
-        area: the pointer of the one it is in. scene: the name of the scene it was opened in. uid: the row.
+        uid: the row.
         showing: heat.ORIGINAL or heat.LOD. wipe: the share of the view's width at which the Original ends and the LOD
             begins; None: one of them is shown alone.
         meshes: by place, as far as they are made. images: by place, what they were drawn for and the image.
     """
 
-    area: int
-    scene: str
     showing: str = heat.LOD
     wipe: float | None = None
     uid: str = ""
     meshes: dict[str, SampledMesh] = field(default_factory=dict)
     images: dict[str, tuple[Any, Any]] = field(default_factory=dict)
-    work: Stepper[None] | None = None
 
 
 shown: Flip | None = None
-longest_step = 0.0  # seconds, since it was opened
-_handles: list[Any] = []
 
 
 def open_in(area: bpy.types.Area, scene: bpy.types.Scene, wipe: float | None = None) -> Flip:
     """Shows the LOD where the Original stands, or both with a wipe between them."""
-    global shown, longest_step
+    global shown
     close()
-    longest_step = 0.0
     shown = Flip(area.as_pointer(), scene.name, wipe=wipe)
-    if not bpy.app.background:
-        _handles.append(bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_PIXEL"))
+    shown.open(_draw)
     refresh()
     return shown
 
@@ -75,15 +68,9 @@ def open_in(area: bpy.types.Area, scene: bpy.types.Scene, wipe: float | None = N
 def close() -> None:
     """Takes it away, if it is there."""
     global shown
-    if shown is not None and shown.work is not None:
-        shown.work.cancel()
+    if shown is not None:
+        shown.close(_tick, refresh)
     shown = None
-    for timer in (_tick, refresh):
-        if bpy.app.timers.is_registered(timer):
-            bpy.app.timers.unregister(timer)
-    while _handles:
-        bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), "WINDOW")
-    redraw()
 
 
 def turn() -> None:
@@ -91,23 +78,20 @@ def turn() -> None:
     if shown is not None:
         shown.showing = heat.ORIGINAL if shown.showing == heat.LOD else heat.LOD
         shown.wipe = None
-        redraw()
+        viewport.redraw()
 
 
 def wipe_to(share: float | None) -> None:
     """Moves the border between the two to a share of the view's width."""
     if shown is not None:
         shown.wipe = share
-        redraw()
+        viewport.redraw()
 
 
 def watch() -> None:
     """Called at each drawing of a view: another row is followed by a timer, outside of the drawing."""
-    area, scene = bpy.context.area, bpy.context.scene
-    if shown is None or area is None or area.as_pointer() != shown.area or scene.name != shown.scene:
-        return
-    if shown.uid != _wanted(scene) and not bpy.app.timers.is_registered(refresh):
-        bpy.app.timers.register(refresh, first_interval=0)
+    if shown is not None and shown.is_here() and shown.uid != _wanted(bpy.context.scene):
+        soon(refresh)
 
 
 def refresh() -> None:
@@ -116,25 +100,15 @@ def refresh() -> None:
     if shown is None or scene is None:
         close()
         return
-    if shown.work is not None:
-        shown.work.cancel()
-    shown.uid, shown.work = _wanted(scene), None
+    shown.stop()
+    shown.uid = _wanted(scene)
     shown.meshes.clear()
     shown.images.clear()
     measured = session.get(shown.uid)
     if measured is not None:
         shown.work = Stepper(_making(shown, measured))
-        if not bpy.app.background and not bpy.app.timers.is_registered(_tick):
-            bpy.app.timers.register(_tick, first_interval=0)
-    redraw()
-
-
-def redraw() -> None:
-    """Has the view that it is in drawn again."""
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()
+        soon(_tick)
+    viewport.redraw()
 
 
 def _wanted(scene: bpy.types.Scene) -> str:
@@ -150,32 +124,19 @@ def _making(flip: Flip, measured: session.Measured) -> Work[None]:
         found = yield from as_part(sampling, number / len(parts), 1 / len(parts))
         flip.meshes[place] = SampledMesh(found.positions, found.normals, found.first, found.cells, found.colors)
         flip.images.pop(place, None)
-        redraw()
+        viewport.redraw()
 
 
 def _tick() -> float | None:
-    """A slice of the work; then Blender may draw and listen."""
-    global longest_step
-    if shown is None or shown.work is None:
-        return None
-    began = last = time.perf_counter()
-    more = True
-    while more and last - began < SLICE:
-        more = shown.work.step()
-        now = time.perf_counter()
-        longest_step, last = max(longest_step, now - last), now
-    if more:
-        return 0.0
-    shown.work = None
-    return None
+    return None if shown is None else shown.work_on()
 
 
 # --- Drawing
 
 
 def _draw() -> None:
-    area, region, scene = bpy.context.area, bpy.context.region, bpy.context.scene
-    if shown is None or area.as_pointer() != shown.area or scene.name != shown.scene:
+    region, scene = bpy.context.region, bpy.context.scene
+    if shown is None or not shown.is_here():
         return
     ink, row = Ink(), active_row(scene)
     reason, measured = why_not(scene), session.get(shown.uid)

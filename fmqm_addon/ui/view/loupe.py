@@ -7,13 +7,13 @@ place changes. It is no data of the file: opening, moving and closing it changes
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 import bpy
 
+from ...blender.display import viewport
 from ...blender.display.inset import Inset
 from ...metric.stepper import Progress, Stepper, Work, as_part
 from .. import session
@@ -21,27 +21,24 @@ from ..properties.rows import active_row
 from . import heat, panes, sight
 from .ink import Ink, box, free_part
 from .result import look_of, showable, why_not
+from .tool import Tool, soon
 
-SLICE = 0.03  # seconds of work of a tick
 _SIDE, _LEAST_SIDE = 400, 48  # pixels of a picture at a UI scale of 1, where there is room
 _HEIGHT = 0.55  # of the view's, at most
 _PAD, _LINE = 10, 18
 
 
 @dataclass
-class Loupe:
+class Loupe(Tool):
     """What is shown of which place.
 
     Attributes:
-        area: the pointer of the one it is in. scene: the name of the scene it was opened in.
         follows: the mouse; else it stays. below: it stands at the lower edge of the view.
         key: the choices that its pictures were made for. sight: the place. pictures: of it, none or three.
         place: x, y, width and height of what is covered, in pixels of the region, once it was drawn.
     """
 
-    area: int
-    scene: str
-    follows: bool
+    follows: bool = False
     below: bool = False
     key: tuple[Any, ...] | None = None
     sight: sight.Sight | None = None
@@ -49,23 +46,17 @@ class Loupe:
     caption: str = ""
     side: int = panes.SECOND
     place: tuple[float, float, float, float] | None = None
-    work: Stepper[None] | None = None
 
 
 shown: Loupe | None = None
-longest_step = 0.0  # seconds, since it was opened
-seconds_to: dict[int, float] = {}  # from the choice of a place to its pictures, by pixels a side
-_handles: list[Any] = []
 
 
 def open_in(area: bpy.types.Area, scene: bpy.types.Scene) -> Loupe:
     """Opens it in a view: at the chosen worst place where one is shown alone, else under the mouse."""
-    global shown, longest_step
+    global shown
     close()
-    longest_step = 0.0
     shown = Loupe(area.as_pointer(), scene.name, follows=heat.focused_patch(scene) is None)
-    if not bpy.app.background:
-        _handles.append(bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_PIXEL"))
+    shown.open(_draw)
     refresh()
     return shown
 
@@ -73,15 +64,9 @@ def open_in(area: bpy.types.Area, scene: bpy.types.Scene) -> Loupe:
 def close() -> None:
     """Takes it away, if it is there."""
     global shown
-    if shown is not None and shown.work is not None:
-        shown.work.cancel()
+    if shown is not None:
+        shown.close(_tick, refresh)
     shown = None
-    for timer in (_tick, refresh):
-        if bpy.app.timers.is_registered(timer):
-            bpy.app.timers.unregister(timer)
-    while _handles:
-        bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), "WINDOW")
-    _redraw()
 
 
 def wanted(scene: bpy.types.Scene) -> tuple[Any, ...]:
@@ -94,11 +79,8 @@ def wanted(scene: bpy.types.Scene) -> tuple[Any, ...]:
 
 def watch() -> None:
     """Called at each drawing of a view: what has changed is followed by a timer, outside of the drawing."""
-    area, scene = bpy.context.area, bpy.context.scene
-    if shown is None or area is None or area.as_pointer() != shown.area or scene.name != shown.scene:
-        return
-    if shown.key != wanted(scene) and not bpy.app.timers.is_registered(refresh):
-        bpy.app.timers.register(refresh, first_interval=0)
+    if shown is not None and shown.is_here() and shown.key != wanted(bpy.context.scene):
+        soon(refresh)
 
 
 def refresh() -> None:
@@ -111,9 +93,9 @@ def refresh() -> None:
     uid, patch = shown.key[:2]
     measured = session.get(uid)
     if measured is None:
-        _stop()
+        shown.stop()
         shown.pictures, shown.sight = [], None
-        _redraw()
+        viewport.redraw()
         return
     if patch is not None and (before is None or before[:2] != (uid, patch)):
         shown.follows = False
@@ -143,21 +125,13 @@ def _begin(scene: bpy.types.Scene) -> None:
     measured = None if row is None else session.get(row.uid)
     if shown is None or shown.sight is None or measured is None:
         return
-    _stop()
+    shown.stop()
     shown.side = _side_now() or shown.side
     shown.work = Stepper(_refining(shown, scene, measured, shown.sight))
-    if not bpy.app.background and not bpy.app.timers.is_registered(_tick):
-        bpy.app.timers.register(_tick, first_interval=0)
-
-
-def _stop() -> None:
-    if shown is not None and shown.work is not None:
-        shown.work.cancel()
-        shown.work = None
+    soon(_tick)
 
 
 def _refining(loupe: Loupe, scene: bpy.types.Scene, measured: session.Measured, place: sight.Sight) -> Work[None]:
-    began = time.perf_counter()
     colors, caption = sight.heat_colors(scene, measured), sight.heat_text(scene, measured, place.patch)
     yield Progress("", 0.0)
     sides = panes.sides(loupe.side)
@@ -165,32 +139,11 @@ def _refining(loupe: Loupe, scene: bpy.types.Scene, measured: session.Measured, 
         drawing = panes.drawing(measured, place.camera, side, colors)
         found = yield from as_part(drawing, number / len(sides), 1 / len(sides))
         loupe.pictures, loupe.caption = [Inset(pixels) for pixels in found], caption
-        seconds_to[side] = time.perf_counter() - began
-        _redraw()
+        viewport.redraw()
 
 
 def _tick() -> float | None:
-    """A slice of the work; then Blender may draw and listen."""
-    global longest_step
-    if shown is None or shown.work is None:
-        return None
-    began = last = time.perf_counter()
-    more = True
-    while more and last - began < SLICE:
-        more = shown.work.step()
-        now = time.perf_counter()
-        longest_step, last = max(longest_step, now - last), now
-    if more:
-        return 0.0
-    shown.work = None
-    return None
-
-
-def _redraw() -> None:
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()
+    return None if shown is None else shown.work_on()
 
 
 # --- Drawing
@@ -223,7 +176,7 @@ def _side_now() -> int:
 
 def _draw() -> None:
     area, scene = bpy.context.area, bpy.context.scene
-    if shown is None or area.as_pointer() != shown.area or scene.name != shown.scene:
+    if shown is None or not shown.is_here():
         return
     ink = Ink()
     left, bottom, right, top = free_part(area, bpy.context.region)
@@ -242,8 +195,8 @@ def _draw() -> None:
     ink.write(text, x + pad, y + height - pad - px(13))
     if not side or reason or not shown.pictures or shown.sight is None:
         return
-    if side != shown.side and not bpy.app.timers.is_registered(refresh):
-        bpy.app.timers.register(refresh, first_interval=0)  # which makes them as large
+    if side != shown.side:
+        soon(refresh)  # which makes them as large
     for number, (picture, label) in enumerate(zip(shown.pictures, _labels(), strict=True)):
         at = x + pad + number * (side + pad)
         ink.write(label, at, y + side + pad + px(6), ink.faint)
