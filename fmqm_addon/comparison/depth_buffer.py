@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -17,6 +17,7 @@ NOTHING = -1  # the triangle of a pixel that shows none
 CENTER = (0.5, 0.5)
 # Of a step: few enough for a processor's cache.
 _TRIANGLES, _SPANS, _FRAGMENTS = 1 << 16, 1 << 16, 1 << 17
+_TILE = 8  # pixels
 _NEAR_STEPS = float(1 << 29)  # a unit of nearness
 _EMPTY = np.iinfo(np.int64).max
 
@@ -69,6 +70,26 @@ class Screen:
                     spans.draw(buffer, few, pixels)
                     yield Progress("", min((start + int(here[-1])) / len(self.corners), 1.0))
         return np.where(buffer == _EMPTY, NOTHING, buffer & 0xFFFFFFFF)
+
+    def about(self, pixels: Ints) -> Screen:
+        """Only those of the triangles that may be seen in some pixels, to ask showing() about these.
+
+        Args:
+            pixels: (N,) as in showing().
+        """
+        width, height = self.size
+        row, column = np.divmod(pixels, width)
+        asked = np.zeros((height // _TILE + 2, width // _TILE + 2), np.int64)
+        asked[row // _TILE + 1, column // _TILE + 1] = 1
+        asked = asked.cumsum(axis=0).cumsum(axis=1)  # tiles above and to the left of each corner of one
+        across = (np.clip(self.x, 0, width - 1) / _TILE).astype(np.int64)
+        along = (np.clip(self.y, 0, height - 1) / _TILE).astype(np.int64)
+        columns = across[self.corners]
+        left, right = columns.min(axis=1), columns.max(axis=1) + 1
+        top, bottom = along[self.corners[:, 0]], along[self.corners[:, 2]] + 1
+        count = asked[bottom, right] - asked[top, right] - asked[bottom, left] + asked[top, left]
+        some = np.flatnonzero(count)
+        return replace(self, names=self.names[some], corners=self.corners[some])
 
     def _spans(self, which: Ints, first: Ints, rows: Ints, at: tuple[float, float], before: Ints | None) -> _Spans:
         """Where some of the triangles cross rows of the image.

@@ -35,7 +35,7 @@ ASPECTS = (0.7, 1.4)  # panels are as high as this many widths at least and at m
 
 AMBIENT, SCORE_AMBIENT = 0.5, 0.65  # shade of a face edge-on; colors that mean numbers are shaded less
 LIGHT = (-0.45, 0.55, 1.0)  # direction to the headlight: right, up, towards the camera
-CONTRAST = 0.16  # pixels that differ this much from a neighbor are looked at in more places
+CONTRAST = 40  # of 255; pixels that differ this much from a neighbor are looked at in more places
 MORE_PLACES = ((3 / 8, 1 / 8), (7 / 8, 3 / 8), (5 / 8, 7 / 8), (1 / 8, 5 / 8))  # no two in a row or column of a pixel
 BATCH = 1 << 13  # places of a step: few enough for a processor's cache
 NEAREST = 1e-3  # diagonals of the reference; what is nearer to the eye is seen by no camera
@@ -180,12 +180,13 @@ def rendering(
     shown = yield from as_part(screen.showing(), 0.1, 0.1)
     covered = np.flatnonzero(shown != NOTHING)
     rows, columns = np.divmod(covered, size[0])
-    images = [np.full((size[0] * size[1], 3), np.array(BACKGROUND) / 255) for _ in paints]
+    images = [np.full((size[0] * size[1], 3), BACKGROUND, np.uint8) for _ in paints]
     shading = _shading(surface, camera, size, columns + 0.5, rows + 0.5, shown[covered], paints, normals)
     for image, colors in zip(images, (yield from as_part(shading, 0.2, 0.4)), strict=True):
-        image[covered] = colors
+        image[covered] = colors + 0.5
     rough = [_differs(image.reshape(size[1], size[0], 3)).ravel() for image in images]
     again = np.flatnonzero(np.any(rough, axis=0))
+    screen = screen.about(again)
     shown = np.empty((len(again), len(MORE_PLACES)), np.int64)
     for number, place in enumerate(MORE_PLACES):
         shown[:, number] = yield from as_part(screen.showing(again, place), 0.6 + 0.02 * number, 0.02)
@@ -194,10 +195,10 @@ def rendering(
     across, down = np.array(MORE_PLACES)[corner].T
     shading = _shading(surface, camera, size, columns + across, rows + down, shown[which, corner], paints, normals)
     for image, here, colors in zip(images, rough, (yield from as_part(shading, 0.7, 0.3)), strict=True):
-        fine = np.full((*shown.shape, 3), np.array(BACKGROUND) / 255)
+        fine = np.full((*shown.shape, 3), BACKGROUND, np.float32)
         fine[which, corner] = colors
-        image[here] = fine.mean(axis=1)[here[again]]
-    return [(image.reshape(size[1], size[0], 3) * 255 + 0.5).astype(np.uint8) for image in images]
+        image[here] = fine.mean(axis=1)[here[again]] + 0.5
+    return [image.reshape(size[1], size[0], 3) for image in images]
 
 
 def _projecting(surface: Surface, camera: Camera, size: tuple[int, int]) -> Work[Screen]:
@@ -269,15 +270,15 @@ def _shading(
     triangle: Ints,
     paints: Sequence[Paint | None],
     normals: Floats | None,
-) -> Work[list[Floats]]:
-    """(N, 3) encoded colors in [0, 1], for each of the paints, of the triangles at places of the image, in pixels."""
-    images = [np.empty((len(columns), 3)) for _ in paints]
+) -> Work[list[NDArray[np.float32]]]:
+    """(N, 3) encoded colors from 0 to 255, for each paint, of the triangles at places of the image, in pixels."""
+    images = [np.empty((len(columns), 3), np.float32) for _ in paints]
     for first in range(0, len(columns), BATCH):
         here = slice(first, first + BATCH)
-        directions = camera.directions(2 * columns[here] / size[0] - 1, 1 - 2 * rows[here] / size[1])
-        shaded = _shaded(surface, camera, directions, triangle[here], paints, normals)
-        for image, colors in zip(images, shaded, strict=True):
-            image[here] = colors
+        x = (2 * columns[here] / size[0] - 1) * camera.half[0]
+        y = (1 - 2 * rows[here] / size[1]) * camera.half[1]
+        for image, colors in zip(images, _shaded(surface, camera, x, y, triangle[here], paints, normals), strict=True):
+            image[here] = 255 * colors
         yield Progress("", min(here.stop / len(columns), 1.0))
     return images
 
@@ -285,50 +286,65 @@ def _shading(
 def _shaded(
     surface: Surface,
     camera: Camera,
-    directions: Floats,
+    x: Floats,
+    y: Floats,
     triangle: Ints,
     paints: Sequence[Paint | None],
     normals: Floats | None,
 ) -> Iterator[Floats]:
-    """(N, 3) encoded colors in [0, 1] of (N,) triangles in (N, 3) directions from the camera, for each paint."""
+    """(N, 3) encoded colors in [0, 1], for each of the paints.
+
+    Args:
+        x, y: (N,) how far to the right and up, at distance 1 from the camera. triangle: (N,) that is seen there.
+    """
     # What is the same for all of a triangle's pixels is computed once.
     seen = np.zeros(len(surface.triangles), bool)
     seen[triangle] = True
     shown = np.flatnonzero(seen)
     row = (np.cumsum(seen) - 1)[triangle]
-    a, b, c = (surface.vertices[surface.triangles[shown, k]] - camera.eye for k in range(3))
+    a, b, c = ((surface.vertices[surface.triangles[shown, k]] - camera.eye) @ camera.axes.T for k in range(3))
     ahead = dot(cross(a, b), c)  # above 0 where the order of the corners has the camera behind the face
-    side = np.where(ahead > 0, 1.0, -1.0)[:, None, None]
+    side = np.where(ahead > 0, 1.0, -1.0)
     # A direction is in the cone of a triangle by its products with the three planes through the eye and an edge.
-    planes = side * np.stack([cross(b, c), cross(c, a), cross(a, b)], axis=1)
-    barycentric = np.maximum(np.einsum("nkc,nc->nk", planes[row], directions), 0)
-    total = barycentric.sum(axis=1, keepdims=True)
-    barycentric = np.where(total > 0, barycentric / np.where(total > 0, total, 1), 1 / 3)
+    planes = [(side * cross(*edge).T).take(row, axis=1) for edge in ((b, c), (c, a), (a, b))]
+    weights = np.stack([np.maximum(right * x + up * y + forward, 0) for right, up, forward in planes])
+    total = weights.sum(axis=0)
+    weights = np.where(total > 0, weights / np.where(total > 0, total, 1), 1 / 3)
     # Towards the camera, whichever side of the face that is; normals that stand on the other side than the order of
     # the corners say which side is meant.
     own = corner_normals(surface, faces=shown) if normals is None else normals[shown]
-    meant = np.where(dot(own.sum(axis=1), cross(b - a, c - a)) < 0, 1.0, -1.0)[:, None, None]
-    smooth = np.einsum("nk,nkc->nc", barycentric, (side * meant * own)[row])
-    light = np.array(LIGHT) * (1, 1, -1) @ camera.axes
-    length = np.linalg.norm(light) * np.sqrt(np.maximum(dot(smooth, smooth), np.finfo(np.float64).tiny))
-    lit = np.maximum(smooth @ light / length, 0)[:, None]
+    own = own @ camera.axes.T
+    meant = np.where(dot(own.sum(axis=1), cross(b - a, c - a)) < 0, side, -side)
+    smooth = _mixed(weights, [(meant * own[:, k].T).take(row, axis=1) for k in range(3)])
+    light = np.array(LIGHT) * (1, 1, -1)
+    length = np.linalg.norm(light) * np.sqrt(np.maximum((smooth * smooth).sum(axis=0), np.finfo(np.float64).tiny))
+    lit = np.maximum(light @ smooth / length, 0)[:, None]
     for paint in paints:
         if paint is None:
-            yield np.clip(surface.color_at(triangle, barycentric), 0, 1) * (AMBIENT + (1 - AMBIENT) * lit)
+            yield np.clip(surface.color_at(triangle, weights.T), 0, 1) * (AMBIENT + (1 - AMBIENT) * lit)
         else:
-            points = camera.eye + np.einsum("nk,nkc->nc", barycentric, np.stack([a, b, c], axis=1)[row])
-            yield paint(triangle, points, barycentric) * (SCORE_AMBIENT + (1 - SCORE_AMBIENT) * lit)
+            points = _mixed(weights, [corner.T.take(row, axis=1) for corner in (a, b, c)]).T @ camera.axes + camera.eye
+            yield paint(triangle, points, weights.T) * (SCORE_AMBIENT + (1 - SCORE_AMBIENT) * lit)
 
 
-def _differs(image: Floats) -> NDArray[np.bool_]:
+def _mixed(weights: Floats, corners: Sequence[Floats]) -> Floats:
+    """(K, N) sums of the (K, N) corners with (3, N) weights."""
+    mixed: Floats = weights[0] * corners[0]
+    mixed += weights[1] * corners[1]
+    mixed += weights[2] * corners[2]
+    return mixed
+
+
+def _differs(image: Pixels) -> NDArray[np.bool_]:
     """(H, W) whether a pixel has more than CONTRAST to one of its four neighbors in any channel."""
     differs = np.zeros(image.shape[:2], bool)
-    across = (np.abs(np.diff(image, axis=1)) > CONTRAST).any(axis=2)
-    down = (np.abs(np.diff(image, axis=0)) > CONTRAST).any(axis=2)
-    differs[:, 1:] |= across
-    differs[:, :-1] |= across
-    differs[1:] |= down
-    differs[:-1] |= down
+    for axis in (0, 1):
+        one, other = (np.moveaxis(image, axis, 0)[part] for part in (slice(1, None), slice(None, -1)))
+        red, green, blue = np.moveaxis(np.maximum(one, other) - np.minimum(one, other) > CONTRAST, 2, 0)
+        rough = red | green | blue
+        marked = np.moveaxis(differs, axis, 0)
+        marked[1:] |= rough
+        marked[:-1] |= rough
     return differs
 
 
