@@ -62,7 +62,7 @@ def picture_of_report(out: Path, reference: Path) -> Path | None:
         print(f"pictures.py: report.png is left as it is: none of {', '.join(BROWSERS)} is installed")
         return None
     levels = build_levels(out)
-    names = [path.name for path in (reference, *reversed(levels))]  # relative: the page names what it is given
+    names = [path.name for path in (reference, *levels)]  # relative: the page names what it is given
     script("score.py", *names, "--report", "report", "--attribution", folder=out)
     picture = out / "report.png"
     size = "{},{}".format(*REPORT_SIZE)

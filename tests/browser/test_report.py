@@ -176,6 +176,8 @@ def test_the_table_is_sorted_by_a_click_and_by_a_key(page: Page, report: Path) -
     assert page.run(state) is None
     page.click(f"{column} button")
     assert table(page) == ["shaken.obj", STRANGE, "cut.glb"] and page.run(state) == "ascending"
+    arrow = f"getComputedStyle(document.querySelector('{column} button'), '::after').content"
+    assert page.run(arrow) == '"↑"'
     page.run(f"document.querySelector('{column} button').focus()")
     page.press("Enter")
     assert table(page) == [STRANGE, "shaken.obj", "cut.glb"] and page.run(state) == "descending"

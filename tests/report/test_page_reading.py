@@ -57,3 +57,10 @@ def test_nothing_is_said_of_a_loss_where_there_is_none() -> None:
 
 def test_long_names_break_where_their_parts_join() -> None:
     assert name_text("<a>_b-c/d.glb") == "<bdi>&lt;a&gt;_<wbr>b-<wbr>c/<wbr>d.glb</bdi>"
+
+
+def test_what_one_pair_has_no_use_for_is_not_there() -> None:
+    one, two = Page(record()), Page(record("a.glb"), record("b.glb"))
+    assert ["hidden" in attributes for page in (one, two) for _, attributes in page.tags
+            if attributes.get("class") == "toolbar"] == [True, False]  # fmt: skip
+    assert "1 is the same" in one.text and "1 is the same" not in Page(record(score=None)).text

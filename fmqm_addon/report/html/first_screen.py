@@ -44,9 +44,11 @@ def masthead(overview: Overview) -> str:
         said.append(f'<strong class="bad">{low:,} below the threshold.</strong>')
     if len(scored) < len(lines):
         said.append(f'<strong class="bad">{len(lines) - len(scored):,} not scored.</strong>')
+    if scored:
+        said.append('<span class="faint">1 is the same as the original.</span>')
     return (
         f'<header class="masthead"><p class="kicker">FMQM report</p><h1>{count_text(len(lines), LOD)} of {of}</h1>'
-        f'<p class="lead">{" ".join(said)} <span class="faint">1 is the same as the original.</span></p></header>\n'
+        f'<p class="lead">{" ".join(said)}</p></header>\n'
     )
 
 
@@ -87,7 +89,7 @@ def toolbar(overview: Overview) -> str:
         for name, label in SHOWS.items()
     )
     return (
-        '<div class="toolbar" role="search" aria-label="Pairs">'
+        f'<div class="toolbar" role="search" aria-label="Pairs"{" hidden" if len(lines) == 1 else ""}>'
         '<label class="find"><span class="hidden-label">Search names and paths</span>'
         '<input type="search" placeholder="Search" autocomplete="off" spellcheck="false"></label>'
         '<p class="found faint number" role="status"></p>'
