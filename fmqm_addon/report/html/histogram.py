@@ -16,7 +16,7 @@ from .fragments import css
 
 WIDTH, HEIGHT = 460, 170
 LEFT, RIGHT, TOP, BOTTOM = 10, 10, 22, 26  # margins
-LETTER, NARROW = 0.021, 0.042  # width of a tick's letter, in the drawing's and in a narrow legend's
+LETTER, NARROW = 0.021, 0.037  # width of a tick's letter, in the drawing's and in a narrow legend's
 
 
 def histogram_svg(counts: Sequence[int], low: float, high: float, mean: float, label: str) -> str:
