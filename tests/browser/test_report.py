@@ -295,6 +295,9 @@ def test_a_phone_scrolls_only_downwards(page: Page, report: Path, many: Path) ->
     )
     assert outside == 0
     assert page.run("parseFloat(getComputedStyle(document.querySelector('figcaption')).fontSize)") >= 12
+    page.run("document.querySelectorAll('details').forEach((each) => { each.open = true })")
+    heads = "[...document.querySelectorAll('.pair.open details th')].filter((head) => head.textContent === 'Triangles')"
+    assert page.run(f"{heads}.map((head) => head.offsetHeight < 40)") == [True]  # a word is not broken; it scrolls
 
 
 @pytest.mark.parametrize(("width", "dark"), [(1280, False), (1280, True), (375, False)])

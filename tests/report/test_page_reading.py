@@ -56,7 +56,7 @@ def test_nothing_is_said_of_a_loss_where_there_is_none() -> None:
 
 
 def test_long_names_break_where_their_parts_join() -> None:
-    assert name_text("<a>_b-c/d.glb") == "<bdi>&lt;a&gt;_<wbr>b-<wbr>c/<wbr>d.glb</bdi>"
+    assert name_text("<a>_b-c/d.glb:e") == "<bdi>&lt;a&gt;_<wbr>b-<wbr>c/<wbr>d.glb:<wbr>e</bdi>"
 
 
 def test_what_one_pair_has_no_use_for_is_not_there() -> None:

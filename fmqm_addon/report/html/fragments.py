@@ -14,7 +14,7 @@ from ..visual.colormap import score_colors
 
 MEGABYTE = 2**20
 _STOPS = 9  # colors of a ramp
-_JOINTS, _BREAK = re.compile(r"[_/\\-]+(?=.)"), r"\g<0><wbr>"
+_JOINTS, _BREAK = re.compile(r"[_:/\\-]+(?=.)"), r"\g<0><wbr>"
 
 
 def bar(value: float | None) -> str:
