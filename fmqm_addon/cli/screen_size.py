@@ -125,6 +125,7 @@ def _measure(args: argparse.Namespace, screen: Screen, reading: Reading, log: Lo
             stepper = sizes.measure(alignment.mesh)
             size = _run(stepper, log, index, path)
             seconds = sum(stepper.seconds.values())
+            notes = (*notes, *(f"{path}: {note}" for note in size.notes))
         except FMQMError as reason:
             error = f"{reason}{REMEDIES.get(type(reason), '')}"
             log.say(error if path in error else f"{path}: {error}")

@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..metric.geometry import Floats, Ints, ranges
 from ..metric.stepper import Progress, Work
@@ -20,6 +21,8 @@ _TRIANGLES, _SPANS, _FRAGMENTS = 1 << 16, 1 << 16, 1 << 17
 _TILE = 8  # pixels
 _NEAR_STEPS = float(1 << 29)  # a unit of nearness
 _EMPTY = np.iinfo(np.int64).max
+
+Kept = Callable[[Ints, Ints], NDArray[np.bool_]]
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,9 @@ class Screen:
     names: Ints
     corners: Ints
 
-    def showing(self, pixels: Ints | None = None, at: tuple[float, float] = CENTER) -> Work[Ints]:
+    def showing(
+        self, pixels: Ints | None = None, at: tuple[float, float] = CENTER, kept: Kept | None = None
+    ) -> Work[Ints]:
         """(N,) int64 the triangle that each pixel shows, from either side, or NOTHING; yields the share done.
 
         A pixel shows a triangle that holds a place in it; of neighbors that share an edge, exactly one does.
@@ -49,6 +54,7 @@ class Screen:
         Args:
             pixels: (N,) ascending, the row times the width plus the column of those that are asked; None: all.
             at: the place: shares of a pixel from its left and its top.
+            kept: whether there is something of (N,) triangles at (N,) pixels; through holes one sees what lies behind.
         """
         width, height = self.size
         before = None  # of each pixel and of the end: how many that come before it are asked
@@ -67,7 +73,7 @@ class Screen:
                 here = some[part]
                 spans = self._spans(start + here, first[here], rows[here], at, before)
                 for few in _parts(spans.count, _FRAGMENTS):
-                    spans.draw(buffer, few, pixels)
+                    spans.draw(buffer, few, pixels, kept)
                     yield Progress("", min((start + int(here[-1])) / len(self.corners), 1.0))
         return np.where(buffer == _EMPTY, NOTHING, buffer & 0xFFFFFFFF)
 
@@ -148,7 +154,7 @@ class _Spans:
     most: Floats
     name: Ints
 
-    def draw(self, buffer: Ints, some: slice, pixels: Ints | None) -> None:
+    def draw(self, buffer: Ints, some: slice, pixels: Ints | None, kept: Kept | None) -> None:
         """Into the buffer: nearness in the upper half of an integer, the triangle in the lower; the least is seen."""
         place, count = self.place[some], self.count[some]
         of = np.repeat(np.arange(some.start, some.stop), count)
@@ -158,6 +164,9 @@ class _Spans:
         # Slivers that are seen from their edge have no reliable slope.
         near = np.clip(near, self.least[of], self.most[of])
         key = ((2 - np.clip(near, -DEEPEST, DEEPEST)) * _NEAR_STEPS).astype(np.int64) << 32 | self.name[of]
+        if kept is not None:
+            there = kept(self.name[of], self.start[of] + across)
+            place, key = place[there], key[there]
         np.minimum.at(buffer, place, key)
 
 

@@ -197,6 +197,7 @@ def is_screen_size(value: object) -> bool:
         )
         and _is_list(value.get("curve"), _is_at_size)
         and len(value["curve"]) > 0
+        and _is_list(value.get("notes", []), _is_text)
     )
 
 

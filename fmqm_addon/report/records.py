@@ -228,6 +228,11 @@ def size_text(found: Mapping[str, Any] | None, kind: str) -> str:
     return MISSING if found is None else f"{found[kind]['bound']} {found[kind]['pixels']:.0f}".strip()
 
 
+def size_notes(found: Mapping[str, Any]) -> list[str]:
+    """What should be known of the renders that sizes are from, in sentences."""
+    return [f"{note[0].upper()}{note[1:]}." for note in found.get("notes", []) if note]
+
+
 def _csv_line(values: Iterable[str | float | None], raw: bool = False) -> str:
     return ",".join(_csv_cell(value, raw) for value in values) + "\n"
 

@@ -15,6 +15,7 @@ VIEW_CHOICES = (6, 12)
 CONDITIONS = ("unlit", "headlight")  # base color alone; base color under a light at the camera
 AMBIENT, HEADLIGHT = 0.2, 0.8  # shade = AMBIENT + HEADLIGHT max(0, n.v)
 BACKGROUND = 0.18  # linear light
+OPAQUE = 0.5  # what has a lower alpha is not there; the rest is opaque
 SMOOTH_ANGLE = 60.0  # degrees; normals of a mesh that has none are smoothed over edges that are less sharp
 
 PIXELS_PER_DEGREE = 67.0  # for FLIP: a monitor of 0.7 m and 3840 pixels, from 0.7 m

@@ -124,12 +124,11 @@ def _features(luminance: Image, pixels_per_degree: float) -> tuple[Image, Image]
     offset = np.arange(-radius, radius + 1)
     smooth = np.exp(-(offset**2) / (2 * deviation**2))
     smooth /= smooth.sum()
+    smoothed = [convolve(luminance, smooth, axis) for axis in (0, 1)]
     strengths = []
     for weights in (-offset * smooth, (offset**2 / deviation**2 - 1) * smooth):
         line = np.where(weights > 0, weights / weights[weights > 0].sum(), weights / -weights[weights < 0].sum())
-        across = convolve(convolve(luminance, line, 1), smooth, 0)
-        along = convolve(convolve(luminance, line, 0), smooth, 1)
-        strengths.append(np.hypot(across, along))
+        strengths.append(np.hypot(convolve(smoothed[0], line, 1), convolve(smoothed[1], line, 0)))
     return strengths[0], strengths[1]
 
 

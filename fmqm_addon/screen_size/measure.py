@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..comparison.normals import corner_normals
 from ..metric.colorspace import encode_srgb
-from ..metric.errors import SettingsError
+from ..metric.errors import MeshError, SettingsError
 from ..metric.geometry import Floats, Ints
 from ..metric.stepper import Progress, Stepper, Work, as_part
 from ..metric.surface import Frame, MeshArrays, QueryBuilder, Surface, preparing_surface
@@ -19,6 +19,7 @@ from .definition import (
     CONDITIONS,
     FADE,
     FIRST_RENDER,
+    OPAQUE,
     PIXELS_PER_DEGREE,
     RENDER,
     SIZES,
@@ -35,7 +36,10 @@ from .ssim import Structure, ssim_map, structure
 from .views import camera_axes, fibonacci_directions
 
 _FROM_FIRST = tuple(size for size in SIZES if 4 * size <= FIRST_RENDER)  # at least 4 by 4 samples a pixel
-_REACH = 24  # pixels around an object that its image's comparison sees
+_SEE_THROUGH = (
+    "some material of the two is see-through: only what is at least half opaque is rendered, and as if it were solid"
+)
+_REACH = 16  # pixels around an object that its image's comparison sees
 _GRID = 16  # images are cut to multiples of so many pixels, so that those of the reference are used again
 
 
@@ -91,11 +95,13 @@ class ScreenSize:
     Attributes:
         curve: from the smallest size to the first at which it fails by any limits, or the largest.
         strict: for a hard pop. fade: for a dithered one; never below strict.
+        notes: what should be known of the renders.
     """
 
     curve: tuple[AtSize, ...]
     strict: Switch
     fade: Switch
+    notes: tuple[str, ...] = ()
 
 
 class ScreenSizes:
@@ -126,7 +132,7 @@ class ScreenSizes:
         """A stepper over finding the sizes of an LOD, in the reference's world; its normals are used if it has any.
 
         Raises:
-            MeshError, while stepping: it cannot be rendered.
+            MeshError, while stepping: it cannot be rendered, or all of the reference is see-through.
         """
         return Stepper(self._measure(mesh))
 
@@ -142,28 +148,38 @@ class ScreenSizes:
     def _measure(self, mesh: MeshArrays) -> Work[ScreenSize]:
         yield Progress("prepare", 0.0)
         model = _Model((yield from _prepared(mesh, _NoQuery, self._reference.surface.frame)))
+        curve = yield from self._curve(model)
+        notes = (_SEE_THROUGH,) if self._reference.see_through or model.see_through else ()
+        return ScreenSize(curve, switch(curve, STRICT), switch(curve, FADE), notes)
+
+    def _curve(self, model: _Model) -> Work[tuple[AtSize, ...]]:
+        """From the smallest size to the first that fails."""
         curve: list[AtSize] = []
         for resolution, sizes in ((FIRST_RENDER, _FROM_FIRST), (RENDER, SIZES[len(_FROM_FIRST) :])):
             for index, axes in enumerate(self._axes):
                 yield Progress("render", 0.1)
-                self._reference.view(index, axes, resolution)
+                self._reference.render(index, axes, resolution, sizes)
                 yield Progress("render", 0.1)
-                model.view(index, axes, resolution)
+                model.render(index, axes, resolution, sizes)
+            if not any(self._reference.view(index, sizes[0]).covered.any() for index in range(len(self._axes))):
+                name = self._reference.surface.name
+                raise MeshError(f"{name}: nothing of it shows, its alpha is below {OPAQUE} all over; unlink its alpha")
             for size in sizes:
                 flip, dissimilarity = np.empty((2, len(CONDITIONS), len(self._axes)))
                 for index in range(len(self._axes)):
                     yield Progress("compare", 0.1 + 0.9 * len(curve) / len(SIZES))
-                    flip[:, index], dissimilarity[:, index] = self._compared(model, index, resolution, size)
+                    flip[:, index], dissimilarity[:, index] = self._compared(model, index, size)
                 curve.append(AtSize(size, flip, dissimilarity))
                 if curve[-1].difference(FADE) > 1:
-                    return ScreenSize(tuple(curve), switch(curve, STRICT), switch(curve, FADE))
-        return ScreenSize(tuple(curve), switch(curve, STRICT), switch(curve, FADE))
+                    return tuple(curve)
+        return tuple(curve)
 
-    def _compared(self, model: _Model, index: int, resolution: int, size: int) -> tuple[list[float], list[float]]:
+    def _compared(self, model: _Model, index: int, size: int) -> tuple[list[float], list[float]]:
         """FLIP and 1 - SSIM under each condition, in a view."""
-        factor = resolution // size
-        one, other = (each.at(index, resolution, factor) for each in (self._reference, model))
+        one, other = (each.view(index, size) for each in (self._reference, model))
         mask = _grown((one.covered > 0) | (other.covered > 0))
+        if not mask.any():  # seen from there, all of both is see-through
+            return [0.0] * len(CONDITIONS), [0.0] * len(CONDITIONS)
         window = _window(mask)
         key = (index, size, window)
         if key not in self._seen:
@@ -203,24 +219,28 @@ class _Model:
 
     def __init__(self, surface: Surface) -> None:
         self.surface = surface
+        self.see_through = False  # as in View: in one that was rendered
         self._normals = corner_normals(surface, SMOOTH_ANGLE)
         self._mipmaps = Mipmaps()
         self._scaled: dict[int, Surface] = {}
         self._views: dict[tuple[int, int], View] = {}
 
-    def view(self, index: int, axes: Floats, resolution: int) -> None:
-        """Renders a view at a resolution, unless that is done."""
-        if (index, resolution) in self._views:
+    def render(self, index: int, axes: Floats, resolution: int, sizes: Sequence[int]) -> None:
+        """Renders a view at a resolution, for these sizes, unless that is done."""
+        if (index, sizes[0]) in self._views:
             return
         if resolution not in self._scaled:
             self._scaled[resolution] = self._mipmaps.for_scale(self.surface, float(resolution))
-        image = render(self._scaled[resolution], self._normals, axes, resolution)
-        # The sizes below need nothing larger than half of it.
-        self._views[index, resolution] = image.smaller(2 if resolution == RENDER else 1)
+        size = max(sizes)
+        view = render(self._scaled[resolution], self._normals, axes, resolution, resolution // size)
+        self.see_through |= view.see_through
+        while size >= min(sizes):
+            self._views[index, size] = view
+            size, view = size // 2, view.halved()
 
-    def at(self, index: int, resolution: int, factor: int) -> View:
-        """A rendered view, box-filtered by a factor."""
-        return self._views[index, resolution].smaller(factor // 2 if resolution == RENDER else factor)
+    def view(self, index: int, size: int) -> View:
+        """One that was rendered."""
+        return self._views[index, size]
 
 
 @dataclass(frozen=True)

@@ -48,7 +48,8 @@ class Mipmaps:
                 level = int(np.round(np.log2(max(density / scale, 1.0))))
                 return replace(texture, pixels=self._level(texture, level)) if level > 0 else texture
 
-            materials.append(replace(material, color=_with_textures(material.color, smaller)))
+            color, alpha = _with_textures(material.color, smaller), _with_textures(material.alpha, smaller)
+            materials.append(replace(material, color=color, alpha=alpha))
         return replace(surface, materials=tuple(materials))
 
     def _level(self, texture: Texture, level: int) -> Pixels:

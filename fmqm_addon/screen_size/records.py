@@ -25,11 +25,12 @@ def definition_record(views: int) -> dict[str, Any]:
 
 
 def size_record(found: ScreenSize) -> dict[str, Any]:
-    """One LOD: its two switch sizes, and the curve that they are from."""
+    """One LOD: its two switch sizes, the curve that they are from, and what should be known of the renders."""
     return {
         "strict": _switch_record(found.strict),
         "fade": _switch_record(found.fade),
         "curve": [_at_size_record(each) for each in found.curve],
+        "notes": list(found.notes),
     }
 
 

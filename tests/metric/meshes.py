@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,6 +21,16 @@ TETRAHEDRON = (
 )
 TRIANGLE = (np.array([[0, 0, 0], [3, 0, 0], [0, 2, 0]], np.float64), np.array([[0, 1, 2]]))
 SMALL = Settings(samples=640, patches=10, color_units=20)
+
+
+@dataclass(frozen=True)
+class ImageAlpha:
+    """The alpha of an image."""
+
+    image: Texture
+
+    def opacity(self, values: Floats) -> Floats:
+        return self.image.alpha_at(values)
 
 
 def grid(columns: int, rows: int) -> tuple[Floats, Ints]:

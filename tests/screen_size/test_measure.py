@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from fmqm_addon.metric.errors import MeshError, SettingsError
-from fmqm_addon.metric.texture import PlainColor
+from fmqm_addon.metric.texture import Material, PlainColor, Texture
 from fmqm_addon.screen_size.definition import FADE, FIRST_RENDER, SIZES, STRICT, Limits
 from fmqm_addon.screen_size.engines import ENGINES, Extent, Level, Screen, chain, distance, numbers, pasteable
 from fmqm_addon.screen_size.measure import AtSize, ScreenSizes, Switch, switch
-from tests.metric.meshes import cube, mesh_arrays, shaken, sphere, surface, texture
+from fmqm_addon.screen_size.records import size_record
+from tests.metric.meshes import ImageAlpha, cube, mesh_arrays, shaken, sphere, surface, texture
 
 
 def curve(*differences: float) -> list[AtSize]:
@@ -129,3 +130,24 @@ def test_no_screen_is_like_that(wrong: dict[str, float]) -> None:
 def test_an_extent_is_in_the_scene_s_units() -> None:
     extent = Extent.of(surface((2 * cube()[0], cube()[1])))
     assert (extent.diagonal, extent.side, extent.radius) == pytest.approx((2 * 3**0.5, 2, 3**0.5))
+
+
+def test_leaves_that_lost_their_holes_fail_and_what_does_not_show_is_refused() -> None:
+    """And the sizes say that something is see-through."""
+    pixels = np.full((4, 4, 4), 255, np.uint8)
+    pixels[:, :2, 3] = 0
+    holes, none = (Texture(each, interpolation="closest") for each in (pixels, 0 * pixels))
+    reference, solid, gone = (
+        replace(mesh_arrays(sphere(), (image,)), materials=(Material("leaf", image, alpha),))
+        for image, alpha in ((holes, ImageAlpha(holes)), (holes, None), (none, ImageAlpha(none)))
+    )
+    sizes = ScreenSizes(reference)
+    sizes.prepare().run()
+    same, worse = (sizes.measure(each).run() for each in (reference, solid))
+    assert same.strict.bound == "at least" and worse.strict.bound == "below"
+    assert all("see-through" in each.notes[0] for each in (same, worse))
+    assert size_record(worse)["notes"] == list(worse.notes)
+    nothing = ScreenSizes(gone)
+    nothing.prepare().run()
+    with pytest.raises(MeshError, match="nothing of it shows"):
+        nothing.measure(gone).run()

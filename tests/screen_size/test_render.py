@@ -9,13 +9,15 @@ import numpy as np
 import pytest
 
 from fmqm_addon.comparison.normals import corner_normals, smoothed_normals
-from fmqm_addon.metric.texture import PlainColor, Texture
+from fmqm_addon.metric.surface import prepare_surface
+from fmqm_addon.metric.texture import Material, PlainColor, Texture
 from fmqm_addon.screen_size.definition import AMBIENT, BACKGROUND, HEADLIGHT, VIEW_CHOICES
 from fmqm_addon.screen_size.mipmaps import Mipmaps, halved
 from fmqm_addon.screen_size.rasterize import rasterize
 from fmqm_addon.screen_size.render import image_side, render
 from fmqm_addon.screen_size.views import camera_axes, fibonacci_directions
-from tests.metric.meshes import cube, grid, sphere, surface
+from tests.metric.meshes import ImageAlpha, cube, grid, mesh_arrays, sphere, surface
+from tests.metric.oracles import NaiveQuery
 
 FRONT = np.eye(3)  # right is x, up is y, the viewer stands at +z
 
@@ -79,8 +81,32 @@ def test_a_sphere_is_lit_from_the_viewer_and_flat_colors_are_not() -> None:
     turned = replace(ball, triangles=ball.triangles[:, ::-1])  # seen from inside: two-sided
     again = render(turned, corner_normals(turned), FRONT, 128)
     assert np.allclose(again.images[1], lit, atol=1e-5)
-    small = view.smaller(4)
+    small, at_once = view.halved().halved(), render(ball, corner_normals(ball), FRONT, 128, 4)
     assert small.covered.shape == (36, 36) and small.images[1].mean() == pytest.approx(lit.mean(), abs=1e-5)
+    assert np.abs(small.images[1] - at_once.images[1]).max() < 1e-6
+    assert np.abs(small.covered - at_once.covered).max() < 1e-6
+
+
+def test_what_is_less_than_half_opaque_is_not_there() -> None:
+    """A square whose left third is cut out, and whose middle is nearly opaque, before one that is solid."""
+    alphas = np.array([100, 200, 255], np.uint8)
+    pixels = np.dstack([np.full((1, 3, 3), 255, np.uint8), alphas[None, :, None]])
+    image = Texture(pixels, interpolation="closest")
+    near, far = grid(3, 3), grid(3, 3)
+    both = (np.concatenate([near[0] + [0, 0, 1], far[0]]), np.concatenate([near[1], far[1] + 16]))
+    mesh = mesh_arrays(both)
+    corners = both[0][both[1]][:, :, :2] / 3
+    leaf, solid = Material("leaf", image, ImageAlpha(image)), Material("solid", PlainColor((0.0, 0.0, 0.0)))
+    material = np.repeat([0, 1], 18)
+    made = prepare_surface(replace(mesh, corners=corners, materials=(leaf, solid), material=material), NaiveQuery)
+    view = render(made, corner_normals(made), FRONT, 128)
+    row = view.images[0][image_side(128) // 2, :, 0]
+    inside = row[view.covered[image_side(128) // 2] > 0]
+    assert view.see_through and inside.mean() == pytest.approx(2 / 3, abs=0.02)
+    assert (inside[: len(inside) // 4] == 0).all() and (inside[-len(inside) // 2 :] == 1).all()
+    alone = prepare_surface(replace(mesh, corners=corners, materials=(leaf, leaf), material=material), NaiveQuery)
+    cut = render(alone, corner_normals(alone), FRONT, 128)
+    assert cut.covered.sum() == pytest.approx(view.covered.sum() * 2 / 3, rel=0.02)
 
 
 def test_normals_are_smooth_over_blunt_edges_only() -> None:
@@ -134,3 +160,6 @@ def test_the_level_is_that_of_the_surface_s_own_density() -> None:
     for size, side in ((1024, 512), (724, 512), (400, 256), (181, 128), (1, 1)):
         texture = Mipmaps().for_scale(plane, size).materials[0].color
         assert isinstance(texture, Texture) and texture.pixels.shape[0] == side
+    leaf = replace(plane.materials[0], alpha=ImageAlpha(plane.materials[0].color))
+    smaller = Mipmaps().for_scale(replace(plane, materials=(leaf,)), 181).materials[0]
+    assert smaller.alpha.image.pixels is smaller.color.pixels, "what is cut out is seen at the same level"

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from html import escape
 from typing import Any
 
-from ..records import SIZES, size_text
+from ..records import SIZES, size_notes, size_text
 
 WIDTH, HEIGHT = 460, 230
 LEFT, RIGHT, TOP, BOTTOM = 44, 16, 14, 44  # margins
@@ -24,7 +24,9 @@ def size_panel(found: Mapping[str, Any] | None) -> str:
     """
     if found is None:
         return ""
-    words = " ".join(f"{kind.capitalize()}: {size_text(found, kind)} px." for kind in SIZES.values())
+    words = " ".join(
+        [*(f"{kind.capitalize()}: {size_text(found, kind)} px." for kind in SIZES.values()), *size_notes(found)]
+    )
     return (
         f"<div><h4>Size on screen</h4>{_curve_svg(found)}"
         f'<p class="note">D is 1 where renders differ as much as a hard switch may. {escape(words)}</p></div>'

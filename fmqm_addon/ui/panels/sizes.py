@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import bpy
 
-from ...report.records import size_text
+from ...report.records import size_notes, size_text
 from ..operators.screen_sizes import FMQM_OT_copy_sizes
 from ..properties.rows import row_screen_size
 from ..sizes import engine_text, levels_of, sized_rows
@@ -30,12 +30,15 @@ class FMQM_PT_sizes(Sidebar, bpy.types.Panel):  # noqa: N801
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, sizes = self.layout, context.scene.fmqm.sizes
+        rows = sized_rows(context.scene)
         table, whole = layout.column(align=True), width(context) - EDGES
         beside_name = 0 if is_narrow(context) else _SIZE
-        for row in sized_rows(context.scene):
+        for row in rows:
             split = table.split(factor=1 - beside_name / whole) if beside_name else table
             split.label(text=cut_in_the_middle(row.name, whole - beside_name), translate=False)
             split.label(text=f"{size_text(row_screen_size(row) or {}, sizes.transition)} px")
+        for said in dict.fromkeys(said for row in rows for said in size_notes(row_screen_size(row) or {})):
+            wrapped(layout, context, said, icon="INFO")
         for level in levels_of(context.scene):
             if level.why:
                 wrapped(layout, context, f"{level.name} has no place in the chain: {level.why}", icon="INFO")
