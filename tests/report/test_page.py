@@ -461,3 +461,32 @@ def test_sizes_on_screen_are_drawn_where_they_were_asked_for() -> None:
     line = next(each for each in drawing.iter() if each.tag.endswith("polyline")).attrib["points"].split()
     assert f"{mark.attrib['cx']},{mark.attrib['cy']}" == line[1]
     assert "Size on screen" not in Page(record()).text
+    noted = Page(record(screen_size=sizes | {"notes": ["some is <b>see-through</b>"]}))
+    assert "Some is <b>see-through</b>." in noted.text
+
+
+def test_a_chain_s_sizes_are_one_drawing_and_its_band_says_what_takes_over_where() -> None:
+    """Of the levels, given in any order: b may be shown as early as a, which is finer; d at no size."""
+
+    def level(name: str, triangles: int, pixels: float, bound: str = "") -> dict[str, Any]:
+        curve = [{"size": 16 * 2**k, "D_strict": 16 * 2**k / pixels} for k in range(4)]
+        switch = {"pixels": pixels, "bound": bound}
+        sizes = {"strict": switch, "fade": switch, "curve": curve, "notes": []}
+        return record(f"rock_{name}.glb", triangles=triangles, screen_size=sizes)
+
+    levels = [level("c", 30, 32.0), level("a", 90, 60.0), level("d", 10, 16.0, "below"), level("b", 50, 64.0)]
+    page = Page(*levels)
+    (html,) = re.findall(r"<figure><figcaption>D against size.*?</figure>", page.html, re.DOTALL)
+    assert "No place: rock_a.glb, rock_d.glb." in html
+    drawing = ElementTree.fromstring(re.search(r"<svg.*?</svg>", html, re.DOTALL)[0])  # type: ignore[index]
+    assert len([each for each in drawing.iter() if each.tag.endswith("circle")]) == 4
+    classes = [each.attrib["class"] for each in drawing.iter() if each.tag.endswith("polyline")]
+    assert classes == ["line without", "line", "line", "line without"], "from fine to coarse"
+    band = [each for each in drawing.iter() if each.tag.endswith("rect")]
+    assert ["".join(each.itertext()) for each in band] == ["c", "b", "Original"]
+    ends = [(float(each.attrib["x"]), float(each.attrib["x"]) + float(each.attrib["width"])) for each in band]
+    thirds = [44 + (460 - 44 - 16) * k / 3 for k in range(4)]
+    assert [at for end in ends for at in end] == pytest.approx(
+        [at for k in range(3) for at in thirds[k : k + 2]], abs=0.2
+    )
+    assert "<figcaption>D against" not in Page(levels[0], record()).html, "one alone has its card's"

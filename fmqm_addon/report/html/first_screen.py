@@ -15,6 +15,7 @@ from ..words import LABELS, LOD
 from .chain_curve import Level, curve_svg
 from .fragments import bar, count_text, css, image, name_text, text
 from .overview import LEVELS, Chain, Line, Overview
+from .size_curve import chain_sizes
 
 SORTS = {
     "number": "Order Given", "name": "Name", "FMQM": "FMQM", "perceived": "Perceived", "triangles": "Triangles",
@@ -189,14 +190,21 @@ def _costs(triangles: int | None, whole: int | None, megabytes: float | None, si
 
 
 def _curves(chain: Chain, overview: Overview) -> str:
-    """The judge's score over triangles and over texture memory, where several were compared with one reference."""
+    """The judge's score over triangles and over texture memory, and the sizes on screen, where several were compared
+    with one reference."""
     known = [line for line in chain.lines if line.score is not None and line.triangles is not None]
-    if len(known) < 2 or chain.triangles is None:
-        return ""
-    label = LABELS[overview.judge.column]
-    triangles = _curve(chain, known, "triangles", label)
-    texture = _curve(chain, known, "texture MB", label)
-    return f'<div class="curves">{triangles}{texture}</div>'
+    drawn = _sizes(chain)
+    if len(known) >= 2 and chain.triangles is not None:
+        label = LABELS[overview.judge.column]
+        drawn = f"{_curve(chain, known, 'triangles', label)}{_curve(chain, known, 'texture MB', label)}{drawn}"
+    return f'<div class="curves">{drawn}</div>' if drawn else ""
+
+
+def _sizes(chain: Chain) -> str:
+    """From which size on screen on each level may be shown; "" for fewer than two."""
+    sized = sorted(chain.lines, key=lambda line: (-(line.triangles or 0), -(line.texture_mb or 0)))
+    levels = [(line.name, line.sizes) for line in sized if line.sizes is not None]
+    return chain_sizes(levels) if len(levels) > 1 else ""
 
 
 def _curve(chain: Chain, lines: Sequence[Line], cost: str, label: str) -> str:

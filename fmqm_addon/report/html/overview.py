@@ -17,6 +17,7 @@ from ..criteria import judge_of, shortfall
 from ..explain import sentences
 from ..records import value_of
 from .fragments import MEGABYTE
+from .size_curve import Curve
 
 Record = Mapping[str, Any]
 
@@ -34,7 +35,7 @@ class Line:
         fmqm, perceived, score: the last is the judge's; None: not scored. level: the difference in words.
         missed: by how much it misses its thresholds; "" for nothing. warnings: how many.
         triangles, texture_mb: None: not known. texture_side: pixels of its largest image; 0: not known.
-        thumbnails: by kind, of KINDS. reason: why it should be looked at.
+        thumbnails: by kind, of KINDS. reason: why it should be looked at. sizes: None: not asked for.
     """
 
     number: int
@@ -53,6 +54,7 @@ class Line:
     texture_side: int = 0
     thumbnails: Mapping[str, str] | None = None
     reason: str = ""
+    sizes: Curve | None = None
 
     @property
     def urgency(self) -> tuple[bool, bool, float]:
@@ -178,6 +180,7 @@ def _line(number: int, record: Record, name: str, judge: Judge) -> Line:
         texture_side=largest_side(Facts(record).distorted),
         thumbnails=None if pictures is None else pictures["thumbnails"],
         reason=_reason(record, missed),
+        sizes=None if record.get("screen_size") is None else Curve.of(record["screen_size"]),
     )
 
 
