@@ -18,9 +18,10 @@ def color_shifts(result: Result) -> Floats:
     count = np.maximum(np.diff(start), 1)[:, None]
     lab = []
     for fields in (result.ref, result.dist):
-        # A row of zeros lets patches without samples, at the end, sum nothing.
-        padded = np.concatenate([fields.ncf.astype(np.float64), np.zeros((1, 3))])
-        sums = np.add.reduceat(padded, start[:-1], axis=0)
+        colors = fields.ncf.astype(np.float64)
+        if start[-2] == len(colors):  # a row of zeros lets patches without samples, at the end, sum nothing
+            colors = np.concatenate([colors, np.zeros((1, 3))])
+        sums = np.add.reduceat(colors, start[:-1], axis=0)
         sums[np.diff(start) == 0] = 0
         lab.append(srgb_to_lab(np.clip(sums / count, 0, 1)) * LAB_SCALE)
     return np.asarray(np.linalg.norm(lab[0] - lab[1], axis=1))

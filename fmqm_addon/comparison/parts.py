@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..metric.evaluation import COLUMNS, Result
+from ..metric.evaluation import Result
 from ..metric.geometry import Floats, Ints
-from ..metric.perceived import PERCEIVED_COLUMNS
 from ..metric.stepper import Progress, Work
 from ..metric.surface import Surface
 from .distances import points_at, squared_distances
@@ -103,6 +102,7 @@ class PartsReport:
 def groupings(surface: Surface) -> Work[tuple[Grouping, ...]]:
     """A surface by objects, connected parts and materials; yields the share done."""
     areas = surface.areas
+    boxes = _boxes(surface)
     yield Progress("", 0.2)
     connected = connected_parts(surface.triangles)
     yield Progress("", 0.6)
@@ -110,24 +110,26 @@ def groupings(surface: Surface) -> Work[tuple[Grouping, ...]]:
     materials = list(dict.fromkeys(names))  # baked for several objects it is one all the same
     by_name = np.array([materials.index(name) for name in names])[surface.material]
     return (
-        _grouping(surface, areas, "object", surface.object, _numbered(surface.objects)),
-        _grouping(surface, areas, "connected", connected, ("",) * (int(connected.max()) + 1)),
-        _grouping(surface, areas, "material", by_name, materials),
+        _grouping(boxes, areas, "object", surface.object, _numbered(surface.objects)),
+        _grouping(boxes, areas, "connected", connected, ("",) * (int(connected.max()) + 1)),
+        _grouping(boxes, areas, "material", by_name, materials),
     )
 
 
 def connected_parts(triangles: Ints) -> Ints:
     """(T,) the connected part of each triangle, numbered from 0 on in the order of their lowest vertices."""
     parent = np.arange(int(triangles.max()) + 1)
-    pairs = np.concatenate([triangles[:, :2], triangles[:, 1:]])
-    while len(pairs):
+    a, b, c = triangles.T
+    one, other = np.concatenate([a, b]), np.concatenate([b, c])
+    while len(one):
         # The higher of two roots hangs on the lower one; then every vertex climbs to its root.
-        np.minimum.at(parent, pairs.max(axis=1), pairs.min(axis=1))
-        while not np.array_equal(grand := parent[parent], parent):
+        np.minimum.at(parent, np.maximum(one, other), np.minimum(one, other))
+        while not np.array_equal(grand := parent.take(parent), parent):
             parent = grand
-        pairs = parent[pairs]
-        pairs = pairs[pairs[:, 0] != pairs[:, 1]]
-    root = parent[triangles[:, 0]]
+        one, other = parent.take(one), parent.take(other)
+        apart = np.flatnonzero(one != other)
+        one, other = one.take(apart), other.take(apart)
+    root = parent.take(a)
     found = np.zeros(len(parent), bool)
     found[root] = True
     return np.asarray((np.cumsum(found) - 1)[root])
@@ -143,6 +145,14 @@ def parts_report(
     """
     parts: list[Part] = []
     gone: list[str] = []
+    faces = np.concatenate([patch.faces for patch in result.patches])
+    patch = np.repeat(np.arange(len(result.patches)), [len(patch.faces) for patch in result.patches])
+    seen = _Seen(
+        result.patch_mesh.parent.take(faces),
+        result.patch_mesh.areas.take(faces),
+        result.of_patches("FMQM").take(patch),
+        result.of_patches("perceived").take(patch),
+    )
     covered = np.zeros(len(reference.triangles), bool)
     box = box_of(reference.vertices)
     known: list[tuple[Ints, NDArray[np.bool_]]] = []
@@ -157,7 +167,7 @@ def parts_report(
         lost = largest[missing[largest]].tolist()
         listed = list(dict.fromkeys([*largest[:LISTED].tolist(), *lost[:LISTED]]))
         names = {row: group.names[row] or _place_in_object(reference, box, group, row) for row in {*listed, *lost}}
-        scores = _scores(group, result)
+        scores = dict(zip(listed, _scores(group, listed, seen), strict=True))
         parts += [
             Part(
                 kind=group.kind,
@@ -188,26 +198,40 @@ def _numbered(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(numbered)
 
 
-def _grouping(surface: Surface, areas: Floats, kind: str, given: Ints, names: Sequence[str]) -> Grouping:
-    """The groups that have triangles."""
+def _boxes(surface: Surface) -> tuple[Floats, Floats]:
+    """(3, T) lowest and highest corner of the box of each triangle."""
+    low, high = np.empty((2, 3, len(surface.triangles)))
+    corners = [np.ascontiguousarray(corner) for corner in surface.triangles.T]
+    for axis, values in enumerate(surface.vertices.T.copy()):
+        a, b, c = (values.take(corner) for corner in corners)
+        np.minimum(np.minimum(a, b), c, out=low[axis])
+        np.maximum(np.maximum(a, b), c, out=high[axis])
+    return low, high
+
+
+def _grouping(boxes: tuple[Floats, Floats], areas: Floats, kind: str, given: Ints, names: Sequence[str]) -> Grouping:
+    """The groups that have triangles.
+
+    Args:
+        boxes: of the triangles.
+    """
     count = np.bincount(given)
     used = np.flatnonzero(count)
     label = (np.cumsum(count > 0) - 1)[given]
     start = np.concatenate([[0], np.cumsum(count[used])])
     small = label.astype(np.uint16) if len(used) < 1 << 16 else label  # sorts several times faster
     order = np.argsort(small, kind="stable") if len(used) > 1 else np.arange(len(label))
-    low, high = np.empty((2, len(used), 3))
-    for axis, values in enumerate(surface.vertices.T):
-        a, b, c = values[surface.triangles[order].T]
-        low[:, axis] = np.minimum.reduceat(np.minimum(np.minimum(a, b), c), start[:-1])
-        high[:, axis] = np.maximum.reduceat(np.maximum(np.maximum(a, b), c), start[:-1])
+    if len(used) > 1:
+        areas, boxes = areas.take(order), (boxes[0].take(order, axis=1), boxes[1].take(order, axis=1))
+    low = np.minimum.reduceat(boxes[0], start[:-1], axis=1).T
+    high = np.maximum.reduceat(boxes[1], start[:-1], axis=1).T
     return Grouping(
         kind=kind,
         names=tuple(names[row] for row in used.tolist()),
         label=label,
         order=order,
         start=start,
-        areas=np.cumsum(areas[order]),
+        areas=np.cumsum(areas),
         low=low,
         high=high,
     )
@@ -244,20 +268,27 @@ def _far_share(
     return share
 
 
-def _scores(group: Grouping, result: Result) -> list[tuple[float | None, float | None]]:
-    """FMQM and perceived of each group."""
-    faces = np.concatenate([patch.faces for patch in result.patches])
-    patch = np.repeat(np.arange(len(result.patches)), [len(patch.faces) for patch in result.patches])
-    label, area = group.label[result.patch_mesh.parent[faces]], result.patch_mesh.areas[faces]
-    whole = np.bincount(label, weights=area, minlength=len(group.names))
-    columns = (
-        result.patch_scores[:, COLUMNS.index("FMQM")],
-        result.patch_perceived[:, PERCEIVED_COLUMNS.index("perceived")],
+@dataclass(frozen=True)
+class _Seen:
+    """The (n,) faces of all patches: their triangles, areas, and the scores of their patches."""
+
+    triangle: Ints
+    area: Floats
+    fmqm: Floats
+    perceived: Floats
+
+
+def _scores(group: Grouping, rows: list[int], seen: _Seen) -> list[tuple[float | None, float | None]]:
+    """FMQM and perceived of some groups."""
+    label, n_groups = group.label.take(seen.triangle), len(group.names)
+    whole = np.bincount(label, weights=seen.area, minlength=n_groups)[rows].tolist()
+    fmqm, perceived = (
+        np.bincount(label, weights=seen.area * scores, minlength=n_groups)[rows].tolist()
+        for scores in (seen.fmqm, seen.perceived)
     )
-    sums = [np.bincount(label, weights=area * column[patch], minlength=len(group.names)) for column in columns]
     return [
-        (None, None) if total <= 0 else (min(fmqm / total, 1.0), min(perceived / total, 1.0))
-        for fmqm, perceived, total in zip(*(values.tolist() for values in (*sums, whole)), strict=True)
+        (None, None) if total <= 0 else (min(a / total, 1.0), min(b / total, 1.0))
+        for a, b, total in zip(fmqm, perceived, whole, strict=True)
     ]
 
 

@@ -91,10 +91,12 @@ def overlapping_share(uv: Floats, layers: Ints) -> Work[float | None]:
         uv: (T, 3, 2) finite texture coordinates. layers: (T,) which texture; only those of one overlap.
     """
     tile = np.floor(_low(uv))
+    low, high = _low(uv) - tile, _high(uv) - tile
+    shift = np.array(_UV_SHIFT)[:, None]
     yield Progress("", 0.3)
     for side in UV_GRIDS:
-        first, last = np.ceil((_low(uv) - tile) * side - _UV_SHIFT), np.floor((_high(uv) - tile) * side - _UV_SHIFT)
-        width, height = np.maximum(last - first + 1, 0).T
+        first, last = np.ceil(low * side - shift), np.floor(high * side - shift)
+        width, height = np.maximum(last - first + 1, 0)
         yield Progress("", 0.3)
         if float((width * height).sum()) <= UV_CELLS:
             break
@@ -105,11 +107,11 @@ def overlapping_share(uv: Floats, layers: Ints) -> Work[float | None]:
     used_keys = []
     for group in _groups(used, cells[used]):
         row = np.repeat(np.arange(len(group)), cells[group])
-        y, x = np.divmod(ranges(np.zeros_like(group), cells[group]), width[group].astype(np.int64)[row])
-        x, y = x + first[group, 0].astype(np.int64)[row], y + first[group, 1].astype(np.int64)[row]
-        corners = (uv[group] - tile[group, None]) * side - _UV_SHIFT
+        y, x = np.divmod(ranges(np.zeros_like(group), cells[group]), width[group].astype(np.int64).take(row))
+        x, y = (at + first[k].take(group).astype(np.int64).take(row) for k, at in enumerate((x, y)))
+        corners = (uv.take(group, axis=0) - tile.T.take(group, axis=0)[:, None]) * side - _UV_SHIFT
         inside = _inside(corners, row, x.astype(np.float64), y.astype(np.float64))
-        used_keys.append(((layers[group[row]] * side + y % side) * side + x % side)[inside])
+        used_keys.append(((layers.take(group).take(row) * side + y % side) * side + x % side)[inside])
         yield Progress("", 0.3)
     keys, times = np.unique(np.concatenate(used_keys or [np.empty(0, np.int64)]), return_counts=True)
     return float(np.count_nonzero(times > 1) / len(keys)) if len(keys) else None
@@ -125,8 +127,8 @@ def _uv_facts(uv: Floats, areas: Floats, overlapping: float | None) -> tuple[Fac
             Fact("uv_missing", None, "share of the textured area", why),
         )
     low, high = _low(uv), _high(uv)
-    outside = (low.min(axis=1) < -UV_EDGE) | (high.max(axis=1) > 1 + UV_EDGE)
-    missing = ~(low.any(axis=1) | high.any(axis=1))
+    outside = (np.minimum(*low) < -UV_EDGE) | (np.maximum(*high) > 1 + UV_EDGE)
+    missing = (low == 0).all(axis=0) & (high == 0).all(axis=0)
     return (
         Fact("uv_outside", float(areas[outside].sum()) / total, "share of the textured area"),
         Fact(
@@ -154,12 +156,16 @@ def _textured(surface: Surface) -> tuple[Ints, Floats]:
 
 
 def _low(uv: Floats) -> Floats:
-    """(T, 2) least of the three corners; faster than .min(axis=1)."""
-    return np.minimum(np.minimum(uv[:, 0], uv[:, 1]), uv[:, 2])
+    """(2, T) least of the three corners; many times as fast as .min(axis=1)."""
+    a, b, c = uv.transpose(1, 2, 0)
+    low = np.minimum(a, b, order="C")
+    return np.minimum(low, c, out=low)
 
 
 def _high(uv: Floats) -> Floats:
-    return np.maximum(np.maximum(uv[:, 0], uv[:, 1]), uv[:, 2])
+    a, b, c = uv.transpose(1, 2, 0)
+    high = np.maximum(a, b, order="C")
+    return np.maximum(high, c, out=high)
 
 
 def _groups(rows: Ints, cells: Ints) -> list[Ints]:
@@ -201,4 +207,5 @@ def _images(surface: Surface) -> list[dict[str, Any]]:
 
 def box_of(vertices: Floats) -> Floats:
     """(2, 3) lowest and highest corner of (V, 3) vertices."""
-    return np.stack([vertices.min(axis=0), vertices.max(axis=0)])
+    axes = vertices.T  # one after the other: several times as fast as .min(axis=0)
+    return np.array([[axis.min() for axis in axes], [axis.max() for axis in axes]])

@@ -106,7 +106,7 @@ def assessing(
         )
         for (surface, fields), doubt, alpha in zip(compared, doubtful, alphas, strict=True)
     ]
-    scale = result.frame.scale
+    scale, diagonals = result.frame.scale, (_diagonal(reference), _diagonal(distorted))
     maps_lost, maps_added = one_sided_maps(reference, distorted), one_sided_maps(distorted, reference)
     pair = (
         *_patch_facts(result),
@@ -126,9 +126,9 @@ def assessing(
         Fact("missing_parts_count", parts.missing_count, "parts"),
         Fact("added", back.beyond, "share of the LOD's area"),
         Fact("added_beyond", reach * scale, "scene units"),
-        *_distance_facts("distance_to_distorted", there, scale, _diagonal(reference)),
-        *_distance_facts("distance_to_reference", back, scale, _diagonal(reference)),
-        Fact("size", _diagonal(distorted) / _diagonal(reference), "of the original's box diagonal"),
+        *_distance_facts("distance_to_distorted", there, scale, diagonals[0]),
+        *_distance_facts("distance_to_reference", back, scale, diagonals[0]),
+        Fact("size", diagonals[1] / diagonals[0], "of the original's box diagonal"),
         Fact("triangle_ratio", len(distorted.triangles) / len(reference.triangles), "times the original's"),
         _images_fact(same_images(reference, distorted)),
         Fact("maps_lost", maps_lost, "maps that only the original has"),

@@ -17,7 +17,7 @@ import numpy as np
 
 from .colorspace import channel_weights, channels
 from .errors import MeshError
-from .features import FieldValues, features_of_patches, pairs_of_patches, pool_features
+from .features import FieldValues, colors_around, features_of_patches, pairs_of_patches, pool_features
 from .fields import Fields, evaluate_fields
 from .geometry import Floats, Ints, morton_order
 from .patches import Patch, PatchMesh, build_patch_mesh, choose_centers, grow_patches
@@ -34,7 +34,7 @@ from .settings import Settings
 from .stepper import Progress, Stepper, Work, as_part
 from .surface import Frame, MeshArrays, QueryBuilder, Surface, prepare_surface
 
-_PATCHES_AT_ONCE = 8  # some milliseconds of work
+_SAMPLES_AT_ONCE = 5000  # of patches that are compared together: few enough for their pairs to stay in a core's cache
 
 
 class Scores(NamedTuple):
@@ -162,24 +162,32 @@ class Evaluation:
         diagonals = np.array([patch.diagonal for patch in prepared.patches])
         features = np.empty((len(prepared.patches), 4))
         perceived = np.empty((len(prepared.patches), len(PERCEIVED_COLUMNS)))
-        for first in range(0, len(features), _PATCHES_AT_ONCE):
-            group = slice(first, first + _PATCHES_AT_ONCE)
-            start = samples.start[first : first + _PATCHES_AT_ONCE + 1]
+        together = max(1, _SAMPLES_AT_ONCE * len(features) // len(samples.positions))
+        for first in range(0, len(features), together):
+            group = slice(first, first + together)
+            start = samples.start[first : first + together + 1]
             here = slice(start[0], start[-1])
             start = start - start[0]
             diagonal = np.repeat(diagonals[group], np.diff(start))  # lengths are in patch diagonals from here on
             positions, units = _shrunk(samples.positions[here], diagonal), np.flatnonzero(samples.unit[here])
             ref, other = _in_diagonals(prepared.ref, here, diagonal), _in_diagonals(dist, here, diagonal)
             near = pairs_of_patches(positions, start, units, RADIUS, itself=True)
-            perceived[group] = perceived_of_patches(positions, start, ref, other, units, near)
+            around = colors_around(near, units, ref.channels, other.channels)
+            perceived[group] = perceived_of_patches(positions, start, ref, other, units, near, around)
             pairs = near
             if settings.radius != RADIUS:
                 pairs = pairs_of_patches(positions, start, units, settings.radius)
-            ref, other = (
-                replace(field, channels=channels(field.channels, settings.color_space)) for field in (ref, other)
-            )
-            features[group] = features_of_patches(positions, start, ref, other, units, pairs, weights, settings)
-            yield Progress("features", 0.8 + 0.2 * min(first + _PATCHES_AT_ONCE, len(features)) / len(features))
+            if settings.color_space != "rgb":
+                ref, other = (
+                    replace(
+                        _in_diagonals(fields, here, diagonal), channels=channels(fields.ncf[here], settings.color_space)
+                    )
+                    for fields in (prepared.ref, dist)
+                )
+            if pairs is not near or settings.color_space != "rgb":
+                around = colors_around(pairs, units, ref.channels, other.channels)
+            features[group] = features_of_patches(positions, start, ref, other, units, pairs, around, weights, settings)
+            yield Progress("features", 0.8 + 0.2 * min(first + together, len(features)) / len(features))
         patch_scores = np.column_stack([features, pool_features(features, settings.pooling)])
         return Result(
             settings=settings,

@@ -21,6 +21,7 @@ EPSILON_COLOR = 1e-10  # V-E3: the same
 EPSILON_GRADIENT = 1e-10  # V-E4: the paper's epsilon
 ROUGH = 1e-5  # relative to the patch: far above float32 rounding of squared distances
 SAME_COLOR = 1e-6  # V-E4: color differences up to this count as none
+_ALONE = 200_000  # multiplications of a product that no BLAS shares among threads: OpenBLAS does from 262,144 on
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,7 @@ def features_of_patches(
     dist: FieldValues,
     units: Ints,
     pairs: Pairs,
+    around: Around,
     weights: Floats,
     settings: Settings,
 ) -> Floats:
@@ -51,18 +53,21 @@ def features_of_patches(
         start: (G + 1,) patch k is start[k] : start[k + 1].
         units: ascending indices of the drawn color units. weights: (C,) of the channels.
         pairs: pairs_of_patches within settings.radius; those of p with what lies at its place count for nothing.
+        around: colors_around them.
     """
     to_ref, to_dist = ref.nearest - positions, dist.nearest - positions
     along = unit_cosine(pairs, units, to_ref)
-    normal = similarity_of_units(pairs.pick(along > settings.normal_threshold), units, ref, dist)
-    tangent = similarity_of_units(pairs.pick(along < settings.tangent_threshold), units, ref, dist)
+    normal = similarity_of_units(pairs, np.flatnonzero(along > settings.normal_threshold), around)
+    in_plane = np.flatnonzero(along < settings.tangent_threshold)
+    tangent = similarity_of_units(pairs, in_plane, around)
 
     if settings.gradient_radius != settings.radius:
         pairs = pairs_of_patches(positions, start, units, settings.gradient_radius)
-        along = unit_cosine(pairs, units, to_ref)
-    gradient_r = color_gradient(pairs.pick(along < settings.tangent_threshold), units, ref.channels)
-    along = unit_cosine(pairs, units, to_dist)
-    gradient_d = color_gradient(pairs.pick(along < settings.tangent_threshold), units, dist.channels)
+        around = colors_around(pairs, units, ref.channels, dist.channels)
+        in_plane = np.flatnonzero(unit_cosine(pairs, units, to_ref) < settings.tangent_threshold)
+    gradient_r = color_gradient(pairs, in_plane, around.ref)
+    in_plane = np.flatnonzero(unit_cosine(pairs, units, to_dist) < settings.tangent_threshold)
+    gradient_d = color_gradient(pairs, in_plane, around.dist)
 
     drawn = np.searchsorted(units, start)
     columns = (
@@ -97,8 +102,9 @@ def geometry_similarity(sdf_r: Floats, sdf_d: Floats, start: Ints) -> Floats:
 
 def moments(sdf_r: Floats, sdf_d: Floats, start: Ints) -> tuple[Floats, Floats]:
     """(2, G) means of two values over the samples of each patch, and (3, G) their variances and covariance."""
-    mean = means(np.stack([sdf_r, sdf_d]), start)
-    r, d = np.stack([sdf_r, sdf_d]) - mean.repeat(np.diff(start), axis=1)
+    both = np.stack([sdf_r, sdf_d])
+    mean = means(both, start)
+    r, d = both - mean.repeat(np.diff(start), axis=1)
     return mean, means(np.stack([r * r, d * d, r * d]), start)
 
 
@@ -116,10 +122,11 @@ class Pairs:
     """Pairs of a color unit p and another sample p' of its patch, unit after unit, p' ascending.
 
     Attributes:
-        row: (m,) which unit. other: (m,) p'. distance: (m,) |pp'|.
+        count: (units,) pairs of each unit. row: (m,) which unit. other: (m,) p'. distance: (m,) |pp'|.
         offset: (m, 3) p' - p, each axis in one piece of memory.
     """
 
+    count: Ints
     row: Ints
     other: Ints
     offset: Floats
@@ -127,12 +134,40 @@ class Pairs:
 
     def pick(self, mask: NDArray[np.bool_]) -> Pairs:
         chosen = np.flatnonzero(mask)  # take is several times faster than a mask
+        row = self.row.take(chosen)
         return Pairs(
-            self.row.take(chosen),
+            np.bincount(row, minlength=len(self.count)),
+            row,
             self.other.take(chosen),
             self.offset.T.take(chosen, axis=1).T,
             self.distance.take(chosen),
         )
+
+
+@dataclass(frozen=True)
+class Around:
+    """The channels of both meshes at the pairs: (C, units) those of p, and (C, m) those of p' less p's.
+
+    Moments of a nearly plain unit do not cancel when they are taken of what differs from p.
+    """
+
+    center_ref: Floats
+    center_dist: Floats
+    ref: Floats
+    dist: Floats
+
+
+def colors_around(pairs: Pairs, units: Ints, channels_r: Floats, channels_d: Floats) -> Around:
+    """What both readings, and several features of each, look at, from (n, C) channels of all samples."""
+    both = []
+    for channels in (channels_r, channels_d):
+        rows = channels.T.copy()
+        center, relative = rows.take(units, axis=1), np.empty((len(rows), len(pairs.other)))
+        for values, of_p, found in zip(rows, center, relative, strict=True):
+            np.subtract(values.take(pairs.other), of_p.repeat(pairs.count), out=found)
+        both.append((center, relative))
+    (center_r, r), (center_d, d) = both
+    return Around(center_r, center_d, r, d)
 
 
 def find_pairs(positions: Floats, units: Ints, radius: float, itself: bool = False) -> Pairs:
@@ -142,34 +177,49 @@ def find_pairs(positions: Floats, units: Ints, radius: float, itself: bool = Fal
 
 def pairs_of_patches(positions: Floats, start: Ints, units: Ints, radius: float, itself: bool = False) -> Pairs:
     """The pairs within each patch, as find_pairs has them, indexed among all samples and all units."""
-    counts, others = [], []
-    for here, drawn in zip(_slices(start), _slices(np.searchsorted(units, start)), strict=True):
-        count, other = _roughly_near(positions[here], units[drawn] - here.start, radius)
-        counts.append(count)
-        others.append(other + here.start)
-    count, other = np.concatenate(counts), np.concatenate(others)
+    count, other = _roughly_near(positions, start, units, radius)
     offset = np.empty((3, len(other)))
     for along, axis in zip(offset, positions.T.copy(), strict=True):
         np.subtract(axis.take(other), axis.take(units).repeat(count), out=along)
-    distance = np.sqrt(dot(offset.T, offset.T))
+    distance = dot(offset.T, offset.T)
+    np.sqrt(distance, out=distance)
     inside = distance < radius
-    pairs = Pairs(np.arange(len(units)).repeat(count), other, offset.T, distance)
+    pairs = Pairs(count, np.arange(len(units)).repeat(count), other, offset.T, distance)
     return pairs.pick(inside if itself else inside & (distance > 0))
 
 
-def _roughly_near(positions: Floats, units: Ints, radius: float) -> tuple[Ints, Ints]:
-    """(units,) how many samples of a patch lie within the radius of each unit, and these, unit after unit.
+def _roughly_near(positions: Floats, start: Ints, units: Ints, radius: float) -> tuple[Ints, Ints]:
+    """(units,) how many samples of its patch lie within the radius of each unit, and these, unit after unit.
 
     In float32, with room for its rounding. Squared distances are inner products: p.p - 2 p.p' + p'.p'.
     """
-    x, y, z = (positions - positions.mean(axis=0)).astype(np.float32).T
-    squares, ones = x * x + y * y + z * z, np.ones(len(positions), np.float32)
-    of_units = np.stack([-2 * x, -2 * y, -2 * z, squares, ones]).take(units, axis=1)
-    squared = np.einsum("ku,kn->un", of_units, np.stack([x, y, z, ones, squares]))
-    near = np.flatnonzero(squared < radius * radius + ROUGH * max(1.0, squares.max()))
-    first = np.arange(len(units) + 1) * len(positions)
-    count = np.diff(np.searchsorted(near, first))
-    return count, near - first[:-1].repeat(count)
+    centered = positions.T - means(positions.T, start).repeat(np.diff(start), axis=1)
+    x, y, z = centered.astype(np.float32)
+    squares = x * x + y * y + z * z
+    samples = np.stack([x, y, z, squares])
+    of_units = np.stack([-2 * x, -2 * y, -2 * z, np.ones_like(x)]).take(units, axis=1).T.copy()
+    limits = np.float32(radius * radius + ROUGH * max(1.0, squares.max())) - squares.take(units)
+    counts, others = [], []
+    for here, drawn in zip(_slices(start), _slices(np.searchsorted(units, start)), strict=True):
+        size = here.stop - here.start
+        near = np.flatnonzero(_product(of_units[drawn], samples[:, here]) < limits[drawn, None])
+        first = np.arange(drawn.stop - drawn.start + 1) * size
+        count = np.diff(np.searchsorted(near, first))
+        near -= (first[:-1] - here.start).repeat(count)
+        counts.append(count)
+        others.append(near)
+    return np.concatenate(counts), np.concatenate(others)
+
+
+def _product(a: NDArray[np.float32], b: NDArray[np.float32]) -> NDArray[np.float32]:
+    """a @ b in pieces so small that no BLAS hands them to threads, which takes them several times as long."""
+    rows = max(1, _ALONE // max(1, b.size))
+    if len(a) <= rows:
+        return a @ b
+    product = np.empty((len(a), b.shape[1]), np.float32)
+    for first in range(0, len(a), rows):
+        np.matmul(a[first : first + rows], b, out=product[first : first + rows])
+    return product
 
 
 def _slices(start: Ints) -> list[slice]:
@@ -185,33 +235,33 @@ def unit_cosine(pairs: Pairs, units: Ints, towards: Floats) -> Floats:
     """
     axis = towards.take(units, axis=0)
     length = np.sqrt(dot(axis, axis))
-    count = np.bincount(pairs.row, minlength=len(units))
-    of_pairs = (axis.T / np.where(length > 0, length, 1.0)).repeat(count, axis=1)
-    cosine = np.abs(dot(of_pairs.T, pairs.offset))
+    product = (axis.T / np.where(length > 0, length, 1.0)).repeat(pairs.count, axis=1)
+    product *= pairs.offset.T
+    cosine, y, z = product  # added up in dot's order, in the same place
+    cosine += z
+    cosine += y
+    np.abs(cosine, out=cosine)
     with np.errstate(invalid="ignore"):
         cosine /= pairs.distance
     return cosine
 
 
-def similarity_of_units(pairs: Pairs, units: Ints, ref: FieldValues, dist: FieldValues) -> NDArray[np.float64]:
-    """(C, units) equations (22) to (25) over each unit: p itself and the p' of its pairs.
-
-    Colors are taken relative to p's, so that the moments of a nearly plain unit do not cancel.
-    """
-    count = np.bincount(pairs.row, minlength=len(units)) + 1.0
-    center_r, center_d = ref.channels[units].T, dist.channels[units].T
-    r = ref.channels.take(pairs.other, axis=0).T - center_r.take(pairs.row, axis=1)
-    d = dist.channels.take(pairs.other, axis=0).T - center_d.take(pairs.row, axis=1)
+def similarity_of_units(pairs: Pairs, chosen: Ints, around: Around) -> NDArray[np.float64]:
+    """(C, units) equations (22) to (25) over each unit: p itself and the p' of its chosen pairs."""
+    row, n_units = pairs.row.take(chosen), len(pairs.count)
+    count = np.bincount(row, minlength=n_units) + 1.0
+    r, d = around.ref.take(chosen, axis=1), around.dist.take(chosen, axis=1)
 
     def mean(values: NDArray[Any]) -> Floats:
-        sums = [np.bincount(pairs.row, channel, minlength=len(units)) for channel in values]
+        sums = [np.bincount(row, channel, minlength=n_units) for channel in values]
         return np.stack(sums) / count
 
     mean_r, mean_d = mean(r), mean(d)
     var_r = np.maximum(mean(r * r) - mean_r * mean_r, 0)
     var_d = np.maximum(mean(d * d) - mean_d * mean_d, 0)
     cov = mean(r * d) - mean_r * mean_d
-    return similarity(center_r + mean_r, center_d + mean_d, var_r, var_d, cov, EPSILON_COLOR)
+    centers = around.center_ref + mean_r, around.center_dist + mean_d
+    return np.asarray(similarity(*centers, var_r, var_d, cov, EPSILON_COLOR))
 
 
 @dataclass(frozen=True)
@@ -222,25 +272,29 @@ class Gradient:
     step: Floats
 
 
-def color_gradient(pairs: Pairs, units: Ints, channels: Floats) -> Gradient:
-    """Equations (28) and (29): the largest color difference by distance among each unit's pairs.
+def color_gradient(pairs: Pairs, chosen: Ints, relative: Floats) -> Gradient:
+    """Equations (28) and (29): the largest color difference by distance among each unit's chosen pairs.
 
     The direction's sign is left out: it is squared away. No pair, or no difference: 0.
+
+    Args:
+        relative: (C, m) channels of p' less those of p, of all pairs.
     """
-    n_channels = channels.shape[1]
-    magnitude = np.zeros((n_channels, len(units)))
-    step = np.zeros((n_channels, len(units), 3))
-    if not len(pairs.row):
+    magnitude = np.zeros((len(relative), len(pairs.count)))
+    step = np.zeros((*magnitude.shape, 3))
+    if not len(chosen):
         return Gradient(magnitude, step)
-    first = first_of_each(pairs.row)
-    present, count = pairs.row.take(first), np.diff(first, append=len(pairs.row))
-    for channel, values in enumerate(channels.T.copy()):
-        difference = np.abs(values.take(pairs.other) - values.take(units.take(present)).repeat(count))
-        slope = np.where(difference > SAME_COLOR, difference, 0) / pairs.distance
+    row, distance = pairs.row.take(chosen), pairs.distance.take(chosen)
+    first = first_of_each(row)
+    present, count = row.take(first), np.diff(first, append=len(row))
+    for channel, values in enumerate(relative):
+        difference = np.abs(values.take(chosen))
+        slope = np.where(difference > SAME_COLOR, difference, 0)
+        slope /= distance
         steepest = np.maximum.reduceat(slope, first)
         steep = np.flatnonzero(slope == steepest.repeat(count))
-        winner = steep.take(first_of_each(pairs.row.take(steep)))
-        magnitude[channel, present], step[channel, present] = steepest, pairs.offset.take(winner, axis=0)
+        winner = chosen.take(steep.take(first_of_each(row.take(steep))))
+        magnitude[channel, present], step[channel, present] = steepest, pairs.offset.T.take(winner, axis=1).T
     step[magnitude == 0] = 0
     return Gradient(magnitude, step)
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .features import FieldValues, Pairs, means, moments
+from .features import Around, FieldValues, Pairs, means, moments
 from .geometry import Floats, Ints, cross, dot
 
 
@@ -37,7 +37,7 @@ LOW_PERCENTILE = 10
 
 
 def perceived_of_patches(
-    positions: Floats, start: Ints, ref: FieldValues, dist: FieldValues, units: Ints, near: Pairs
+    positions: Floats, start: Ints, ref: FieldValues, dist: FieldValues, units: Ints, near: Pairs, around: Around
 ) -> Floats:
     """(G, 5) shape, facing, color, detail and perceived of some patches, each in [0, 1].
 
@@ -46,12 +46,12 @@ def perceived_of_patches(
         start: (G + 1,) patch k is start[k] : start[k + 1].
         ref, dist: the fields there; their channels are sRGB in [0, 1]. dist.sdf counts without its sign.
         units: ascending indices of the drawn color units.
-        near: all pairs within RADIUS, each unit with itself among them.
+        near: all pairs within RADIUS, each unit with itself among them. around: colors_around them.
     """
     to_ref, to_dist = ref.nearest - positions, dist.nearest - positions
     sdf_d = side(ref.sdf) * side(dot(to_ref, to_dist)) * np.abs(dist.sdf)
     facing = facing_similarity(to_ref, to_dist)
-    color, detail = color_similarities(near, units, ref.channels, dist.channels)
+    color, detail = color_similarities(near, around)
 
     drawn = np.searchsorted(units, start)
     table = np.empty((len(start) - 1, 5))
@@ -108,21 +108,19 @@ def facing_similarity(to_ref: Floats, to_dist: Floats) -> Floats:
     return 1 - angle / (np.pi / 2)
 
 
-def color_similarities(near: Pairs, units: Ints, colors_r: Floats, colors_d: Floats) -> tuple[Floats, Floats]:
+def color_similarities(near: Pairs, around: Around) -> tuple[Floats, Floats]:
     """(C, units) color, from the moments of colors over each unit, and (C, units) detail, from their slopes.
 
-    Positions and colors are taken relative to p's, so that the moments of a nearly plain unit do not cancel.
-
     Args:
-        near: pairs, each unit with itself among them. colors_r, colors_d: (n, C) of all samples.
+        near: pairs, each unit with itself among them. around: colors_around them.
     """
-    first = np.searchsorted(near.row, np.arange(len(units)))
-    count = np.diff(first, append=len(near.row))
-    scratch = np.empty(len(near.row))  # products come and go in one place, which stays in the cache
+    count, n_units = near.count, len(near.count)
+    first = np.cumsum(count) - count
+    scratch = np.empty(len(near.other))  # products come and go in one place, which stays in the cache
 
     def mean(rows: Sequence[Floats] | Floats, times: Sequence[Floats] | Floats) -> Floats:
         """(k, units) means over each unit of (k, m) values times others."""
-        sums = np.empty((len(rows), len(units)))
+        sums = np.empty((len(rows), n_units))
         for total, row, other in zip(sums, rows, times, strict=True):
             np.add.reduceat(np.multiply(row, other, out=scratch), first, out=total)
         return sums / count
@@ -137,13 +135,6 @@ def color_similarities(near: Pairs, units: Ints, colors_r: Floats, colors_d: Flo
         }
     )
 
-    def around(colors: Floats) -> tuple[Floats, Floats]:
-        """(C, units) of p, and (C, m) of p' relative to it."""
-        rows = colors.T.copy()
-        center, relative = rows.take(units, axis=1), rows.take(near.other, axis=1)
-        relative -= center.repeat(count, axis=1)
-        return center, relative
-
     def slope(values: Floats, mean_value: Floats) -> list[Floats]:
         cov = [
             mean(values, [axis] * len(values)) - mean_axis * mean_value
@@ -151,11 +142,11 @@ def color_similarities(near: Pairs, units: Ints, colors_r: Floats, colors_d: Flo
         ]
         return [a * cov[0] + b * cov[1] + c * cov[2] for a, b, c in fit]
 
-    (at_r, r), (at_d, d) = around(colors_r), around(colors_d)
+    r, d = around.ref, around.dist
     mean_r, mean_d = (np.add.reduceat(values, first, axis=1) / count for values in (r, d))
     variances = (mean(r, r) - mean_r * mean_r) + (mean(d, d) - mean_d * mean_d)
     contrast = likeness(mean(r, d) - mean_r * mean_d, variances, C2)
-    color = _of_vectors([at_r + mean_r], [at_d + mean_d], C1) * contrast
+    color = _of_vectors([around.center_ref + mean_r], [around.center_dist + mean_d], C1) * contrast
     return color, _of_vectors(slope(r, mean_r), slope(d, mean_d), K)
 
 

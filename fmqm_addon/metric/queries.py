@@ -10,7 +10,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from .geometry import Floats, Ints, closest_on_triangles, cross, dot
+from .geometry import Floats, Ints, closest_on_triangles, cross, dot, lengths
 from .stepper import Progress, Work, as_part, finish
 from .surface import Surface, SurfaceQuery, triangle_normals
 
@@ -64,25 +64,34 @@ def nearest_triangles(surface: Surface, points: Floats, reach: Floats | None) ->
         points: in an order in which neighbours are near in space.
         reach: (N,) upper bounds of the distances, where known.
     """
-    triangle = np.empty(len(points), np.int64)
     query, size = surface.query, batch_size(surface.query)
-    if reach is not None or isinstance(query, BatchQuery):  # which asks at once: no answer bounds another
-        for first in range(0, len(points), size):
-            here = slice(first, first + size)
-            triangle[here] = query.nearest(points[here], None if reach is None else loosened(reach[here]))
-            yield Progress("", min(1.0, (first + size) / len(points)))
-        return triangle
+    if reach is None and not isinstance(query, BatchQuery):  # which asks at once: no answer bounds another
+        return (yield from nearest_one_by_one(surface, points))
+    triangle = np.empty(len(points), np.int64)
+    for first in range(0, len(points), size):
+        here = slice(first, first + size)
+        triangle[here] = query.nearest(points[here], None if reach is None else loosened(reach[here]))
+        yield Progress("", min(1.0, (first + size) / len(points)))
+    return triangle
+
+
+def nearest_one_by_one(surface: Surface, points: Floats) -> Work[Ints]:
+    """As nearest_triangles, one question after the other: what was found for some bounds the others' distances."""
+    query = surface.query
+    triangle = np.empty(len(points), np.int64)
     order, looked_up = np.arange(len(points)), 0
     for index, chosen in enumerate(_coarse_to_fine(order)):
         guides = _guide(order, index) if index else chosen
-        for first in range(0, len(chosen), size):
-            batch = chosen[first : first + size]
-            if index == 0:
-                bounds = np.full(len(batch), np.inf)
+        for first in range(0, len(chosen), _BATCH):
+            batch = chosen[first : first + _BATCH]
+            here, bounds = points.take(batch, axis=0), np.full(len(batch), np.inf)
+            if index:
+                guide = triangle.take(guides[first : first + _BATCH])
+                bounds = lengths(here - closest_on(surface, here, guide)[0])
+            if isinstance(query, BatchQuery):
+                triangle[batch] = query.one_by_one(here, bounds)
             else:
-                guide = triangle[guides[first : first + size]]
-                bounds = np.linalg.norm(points[batch] - closest_on(surface, points[batch], guide)[0], axis=1)
-            triangle[batch] = query.nearest(points[batch], loosened(bounds))
+                triangle[batch] = query.nearest(here, loosened(bounds))
             looked_up += len(batch)
             yield Progress("", looked_up / len(points))
     return triangle

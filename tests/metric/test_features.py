@@ -16,6 +16,7 @@ from fmqm_addon.metric.features import (
     Gradient,
     Pairs,
     color_gradient,
+    colors_around,
     features_of_patches,
     find_pairs,
     geometry_gradient_similarity,
@@ -79,6 +80,17 @@ cases = st.builds(Case, seeds, st.sampled_from(KINDS))
 
 def members_by_unit(pairs: Pairs, units: Ints) -> list[list[int]]:
     return [pairs.other[pairs.row == k].tolist() for k in range(len(units))]
+
+
+def similarity_of(pairs: Pairs, units: Ints, ref: FieldValues, dist: FieldValues) -> Floats:
+    """Of units with all their pairs."""
+    around = colors_around(pairs, units, ref.channels, dist.channels)
+    return similarity_of_units(pairs, np.arange(len(pairs.other)), around)
+
+
+def gradient_of(pairs: Pairs, units: Ints, channels: Floats) -> Gradient:
+    """Of units with all their pairs."""
+    return color_gradient(pairs, np.arange(len(pairs.other)), colors_around(pairs, units, channels, channels).ref)
 
 
 # --- color units ------------------------------------------------------------------------------------------
@@ -197,7 +209,7 @@ def test_a_sample_against_itself_is_exactly_1(seed: int, n: int, exponent: float
 @given(cases, st.sampled_from([0.1, 0.3, math.inf]))
 def test_similarity_of_units_is_s_over_each_unit_with_p(case: Case, radius: float) -> None:
     pairs = find_pairs(case.positions, case.units, radius)
-    found = similarity_of_units(pairs, case.units, case.ref, case.dist)
+    found = similarity_of(pairs, case.units, case.ref, case.dist)
     assert found.shape == (3, len(case.units))
     for k, others in enumerate(members_by_unit(pairs, case.units)):
         here = [int(case.units[k]), *others]
@@ -213,7 +225,7 @@ def test_a_unit_without_others_compares_p_alone() -> None:
     units = np.array([1])
     pairs = find_pairs(np.array([[0, 0, 0], [9.0, 0, 0]]), units, 1)
     expected = (2 * 0.2 * 0.6 / (0.04 + 0.36)) ** (1 / 3)
-    np.testing.assert_allclose(similarity_of_units(pairs, units, *fields), np.full((3, 1), expected), rtol=1e-8)
+    np.testing.assert_allclose(similarity_of(pairs, units, *fields), np.full((3, 1), expected), rtol=1e-8)
 
 
 @given(seeds, st.floats(-7, -2))
@@ -224,7 +236,7 @@ def test_moments_of_a_nearly_plain_unit_do_not_cancel(seed: int, exponent: float
     a, b = 0.9 + rng.normal(0, 10**exponent, (2, 20, 3))
     ref, dist = (FieldValues(positions, np.zeros(20), values) for values in (a, b))
     units = np.array([3])
-    found = similarity_of_units(find_pairs(positions, units, math.inf), units, ref, dist)
+    found = similarity_of(find_pairs(positions, units, math.inf), units, ref, dist)
     expected = [s_of(a[:, c].tolist(), b[:, c].tolist(), 1e-10) for c in range(3)]
     np.testing.assert_allclose(found[:, 0], expected, rtol=1e-5)
 
@@ -263,7 +275,7 @@ def test_geometry_gradients_by_hand(ref: list[list[float]], dist: list[list[floa
 def test_color_gradients(case: Case, radius: float) -> None:
     """Equations (28) and (29): the steepest difference of each unit and channel, and where it leads."""
     pairs = find_pairs(case.positions, case.units, radius)
-    gradient = color_gradient(pairs, case.units, case.ref.channels)
+    gradient = gradient_of(pairs, case.units, case.ref.channels)
     assert gradient.magnitude.shape == (3, len(case.units))
     for k, others in enumerate(members_by_unit(pairs, case.units)):
         for channel in range(3):
@@ -285,10 +297,10 @@ def test_color_gradients_by_hand() -> None:
     positions = np.array([[0, 0, 0], [0.1, 0, 0], [0, 0.2, 0], [0, 0, 1e-3]])
     channels = np.array([[0.5, 0.5, 0.5], [0.3, 0.5, 0.5], [0.8, 0.5, 0.5 + 2e-6], [0.5, 0.5 + 9e-7, 0.5]])
     units = np.array([0])
-    gradient = color_gradient(find_pairs(positions, units, 1), units, channels)
+    gradient = gradient_of(find_pairs(positions, units, 1), units, channels)
     np.testing.assert_allclose(gradient.magnitude[:, 0], [2, 0, 1e-5], rtol=1e-9)
     assert gradient.step[:, 0].tolist() == [[0.1, 0, 0], [0, 0, 0], [0, 0.2, 0]]
-    alone = color_gradient(find_pairs(positions, units, 1e-4), units, channels)
+    alone = gradient_of(find_pairs(positions, units, 1e-4), units, channels)
     assert (alone.magnitude == 0).all(), "no neighbor: gradient 0"
     assert (alone.step == 0).all()
 
@@ -351,7 +363,8 @@ def features_of(
 ) -> list[float]:
     """The features of one patch."""
     start, pairs = np.array([0, len(positions)]), find_pairs(positions, units, settings.radius)
-    return features_of_patches(positions, start, ref, dist, units, pairs, weights, settings)[0].tolist()
+    around = colors_around(pairs, units, ref.channels, dist.channels)
+    return features_of_patches(positions, start, ref, dist, units, pairs, around, weights, settings)[0].tolist()
 
 
 THRESHOLDS = {"normal_threshold": 0.8, "tangent_threshold": 0.4}
@@ -426,6 +439,7 @@ def test_patches_together_are_the_patches_alone(one: int, other: int) -> None:
     positions, start = joined("positions"), np.array([0, first, first + len(cases[1].positions)])
     units = np.concatenate([cases[0].units, cases[1].units + first])
     pairs = pairs_of_patches(positions, start, units, settings.radius)
-    together = features_of_patches(positions, start, ref, dist, units, pairs, RGB, settings)
+    around = colors_around(pairs, units, ref.channels, dist.channels)
+    together = features_of_patches(positions, start, ref, dist, units, pairs, around, RGB, settings)
     alone = [features_of(case.positions, case.ref, case.dist, case.units, RGB, settings) for case in cases]
     np.testing.assert_allclose(together, alone, rtol=1e-12)

@@ -14,7 +14,7 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from fmqm_addon.metric.evaluation import Result
-from fmqm_addon.metric.features import FieldValues, find_pairs, pairs_of_patches
+from fmqm_addon.metric.features import FieldValues, colors_around, find_pairs, pairs_of_patches
 from fmqm_addon.metric.geometry import Floats, Ints
 from fmqm_addon.metric.perceived import (
     PERCEIVED_COLUMNS,
@@ -39,7 +39,8 @@ def perceived_of(positions: Floats, ref: FieldValues, dist: FieldValues, units: 
     """The row of one patch."""
     start = np.array([0, len(positions)])
     near = pairs_of_patches(positions, start, units, RADIUS, itself=True)
-    return perceived_of_patches(positions, start, ref, dist, units, near)[0].tolist()
+    around = colors_around(near, units, ref.channels, dist.channels)
+    return perceived_of_patches(positions, start, ref, dist, units, near, around)[0].tolist()
 
 
 def true_distances(case: Case) -> None:
@@ -78,7 +79,8 @@ def test_patches_together_are_the_patches_alone(one: int, other: int) -> None:
         for fields in ([case.ref for case in pair], [case.dist for case in pair])
     )
     near = pairs_of_patches(positions, start, units, RADIUS, itself=True)
-    together = perceived_of_patches(positions, start, ref, dist, units, near)
+    around = colors_around(near, units, ref.channels, dist.channels)
+    together = perceived_of_patches(positions, start, ref, dist, units, near, around)
     alone = [perceived_of(case.positions, case.ref, case.dist, case.units) for case in pair]
     np.testing.assert_allclose(together, alone, rtol=1e-12)
 
@@ -154,6 +156,11 @@ def near_units(positions: Floats, units: Ints) -> Any:
     return find_pairs(positions, units, RADIUS, itself=True)
 
 
+def color_and_detail(positions: Floats, units: Ints, one: Floats, other: Floats) -> tuple[Floats, Floats]:
+    near = near_units(positions, units)
+    return color_similarities(near, colors_around(near, units, one, other))
+
+
 def test_units_hold_p_and_all_that_lies_at_its_place() -> None:
     """The paper's pairs leave out distance 0; here it counts, and the radius stays open."""
     positions = np.array([[0, 0, 0], [0.1, 0, 0], [0, 0, 0], [0.125, 0, 0], [0, np.nextafter(0.125, 0), 0]])
@@ -167,7 +174,7 @@ def test_units_hold_p_and_all_that_lies_at_its_place() -> None:
 @given(cases, st.sampled_from([0.2, 1.0]))
 def test_color_and_detail_of_units(case: Case, size: float) -> None:
     positions = case.positions * size
-    found = color_similarities(near_units(positions, case.units), case.units, case.ref.channels, case.dist.channels)
+    found = color_and_detail(positions, case.units, case.ref.channels, case.dist.channels)
     for k, unit in enumerate(case.units.tolist()):
         expected = perceived_color(positions, case.ref.channels, case.dist.channels, unit)
         np.testing.assert_allclose([part[:, k] for part in found], np.array(expected).T, rtol=1e-9, atol=1e-12)
@@ -183,7 +190,7 @@ def ramp(slope: float, level: float = 0.5) -> tuple[Floats, Floats]:
 
 def of_ramps(one: tuple[Floats, Floats], other: tuple[Floats, Floats]) -> tuple[float, float]:
     unit = np.array([0])
-    color, detail = color_similarities(near_units(one[0], unit), unit, one[1], other[1])
+    color, detail = color_and_detail(one[0], unit, one[1], other[1])
     assert (color == color[0]).all() and (detail == detail[0]).all()
     return float(color[0, 0]), float(detail[0, 0])
 
@@ -211,7 +218,7 @@ def test_what_nobody_sees_hardly_counts() -> None:
     positions, plain = ramp(0)
     noise = np.random.default_rng(0).integers(-1, 2, plain.shape) / 255
     unit = np.array([0])
-    color, detail = color_similarities(near_units(positions, unit), unit, plain, plain + noise)
+    color, detail = color_and_detail(positions, unit, plain, plain + noise)
     assert color.min() > 0.98 and detail.min() > 0.99
 
 
@@ -222,8 +229,7 @@ def test_moments_of_a_nearly_plain_unit_do_not_cancel(seed: int, exponent: float
     positions = rng.uniform(0, 0.06, (20, 3))
     a, b = 0.9 + rng.normal(0, 10**exponent, (2, 20, 3))
     unit = np.array([3])
-    near = near_units(positions, unit)
-    found, turned = (np.array(color_similarities(near, unit, *pair)) for pair in ((a, b), (b, a)))
+    found, turned = (np.array(color_and_detail(positions, unit, *pair)) for pair in ((a, b), (b, a)))
     np.testing.assert_allclose(found, turned, rtol=1e-12)
     np.testing.assert_allclose(found[:, :, 0].T, perceived_color(positions, a, b, 3), rtol=1e-10)
 
