@@ -29,11 +29,12 @@ from .perceived import (
     perceived_of_pair,
     perceived_of_patches,
 )
-from .sampling import Samples, draw_samples, join_samples
+from .sampling import PatchSamples, Samples, draw_samples, join_samples
 from .settings import Settings
 from .stepper import Progress, Stepper, Work, as_part
 from .surface import Frame, MeshArrays, QueryBuilder, Surface, prepare_surface
 
+_DRAWN_AT_ONCE = 8  # patches
 _SAMPLES_AT_ONCE = 5000  # of patches that are compared together: few enough for their pairs to stay in a core's cache
 
 
@@ -130,11 +131,13 @@ class Evaluation:
             chosen.append(center)
             yield Progress("prepare", 0.05 + 0.05 * len(chosen) / settings.patches)
         centers = np.array(chosen)
-        patches, parts = [], []
+        patches: list[Patch] = []
+        parts: list[PatchSamples] = []
         total_area = mesh.area
         for patch in grow_patches(mesh, centers, settings.patches):
             patches.append(patch)
-            parts.append(draw_samples(mesh, patch, total_area, settings))
+            if len(patches) % _DRAWN_AT_ONCE == 0 or len(patches) == len(centers):
+                parts += draw_samples(mesh, patches[len(parts) :], total_area, settings)
             yield Progress("prepare", 0.1 + 0.3 * len(patches) / len(centers))
         samples = join_samples(parts)
         if not len(samples.positions):

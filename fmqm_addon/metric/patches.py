@@ -19,6 +19,8 @@ SPLIT_BELOW = 4  # V-B: once split, no triangle is above S_global / (SPLIT_BELOW
 AREA_ROUNDING = 1e-9  # relative: an area that reaches its target up to rounding has reached it
 
 _FPS_BLOCK = 256  # vertices that share a bounding box in farthest point sampling
+_TOGETHER = 16  # patches that grow side by side, at most
+_MARKS = 1 << 24  # of faces and vertices of these
 
 
 @dataclass(frozen=True)
@@ -182,42 +184,113 @@ def grow_patches(mesh: PatchMesh, centers: Ints, n_patches: int) -> Iterator[Pat
     centre first.
     """
     incident, start = _incident_faces(mesh)
-    seen_face = np.full(len(mesh.triangles), -1)
-    seen_vertex = np.full(len(mesh.vertices), -1)
-    scratch = np.empty(max(len(seen_face), len(seen_vertex)), np.int64)
-    centroids: Floats | None = None
     target = mesh.area / n_patches * (1 - AREA_ROUNDING)
-    for number, center in enumerate(centers.tolist()):
-        rings: list[Ints] = []
-        area = 0.0
-        frontier = np.array([center])
-        seen_vertex[center] = number
-        while area < target and frontier.size:
-            faces = incident[ranges(start[frontier], start[frontier + 1])]
-            faces = _once(faces[seen_face[faces] != number], scratch)
-            seen_face[faces] = number
-            rings.append(faces)
-            area += float(mesh.areas[faces].sum())
-            around = mesh.triangles[faces].ravel()
-            frontier = _once(around[seen_vertex[around] != number], scratch)
-            seen_vertex[frontier] = number
-        extended = area < target
-        if extended:
-            if centroids is None:
-                centroids = mesh.vertices[mesh.triangles].mean(axis=1)
-            rest = np.flatnonzero(seen_face != number)
-            offset = centroids - mesh.vertices[center]
+    size = len(mesh.triangles) + len(mesh.vertices)
+    together = max(1, min(_TOGETHER, len(centers), _MARKS // max(1, size)))
+    marks = np.full(together * size, -1, np.int32)
+    centroids: _Centroids | None = None
+    for first in range(0, len(centers), together):
+        group = centers[first : first + together]
+        areas, found = _grow_rings(mesh, group, target, incident, start, marks)
+        for center, area, faces in zip(group.tolist(), areas, found, strict=True):
+            extended = area < target
+            if extended:
+                centroids = centroids or _Centroids(mesh)
+                more = centroids.nearest(mesh.vertices[center], faces, target - area)
+                faces = np.sort(np.concatenate([faces, more]))
+            corners = mesh.vertices.take(mesh.triangles.take(faces, axis=0).ravel(), axis=0)
+            yield Patch(
+                center=center,
+                faces=faces,
+                area=float(mesh.areas.take(faces).sum()),
+                diagonal=float(np.linalg.norm(corners.max(axis=0) - corners.min(axis=0))),
+                extended=extended,
+            )
+
+
+def _grow_rings(
+    mesh: PatchMesh, centers: Ints, target: float, incident: Ints, start: Ints, marks: NDArray[np.int32]
+) -> tuple[list[float], list[Ints]]:
+    """Areas and ascending faces of several patches, each grown until it has the target or no neighbours.
+
+    They grow side by side, a ring at a time: most rings are small, and numpy's calls cost more than their faces.
+
+    Args:
+        marks: -1 everywhere, for each face and vertex of each patch; and so again at the end.
+    """
+    n_faces, n_vertices = len(mesh.triangles), len(mesh.vertices)
+    face_marks, vertex_marks = marks[: len(centers) * n_faces], marks[len(marks) - len(centers) * n_vertices :]
+    areas = [0.0] * len(centers)
+    growing = np.ones(len(centers), bool)
+    patch, vertex = np.arange(len(centers)), centers
+    vertex_marks[patch * n_vertices + vertex] = 0
+    faces, vertices = [], [patch * n_vertices + vertex]
+    while patch.size:
+        first, last = start.take(vertex), start.take(vertex + 1)
+        key = incident.take(ranges(first, last))
+        key += (patch * n_faces).repeat(last - first)
+        key = _once(key, face_marks)
+        faces.append(key)
+        patch, face = np.divmod(key, n_faces)
+        of_faces = mesh.areas.take(face)
+        ends = np.searchsorted(patch, np.arange(len(centers) + 1)).tolist()
+        for k, (begin, end) in enumerate(zip(ends[:-1], ends[1:], strict=True)):
+            if end > begin:
+                areas[k] += float(of_faces[begin:end].sum())
+                growing[k] = areas[k] < target
+        grows = np.flatnonzero(growing.take(patch))
+        key = mesh.triangles.take(face.take(grows), axis=0).ravel()
+        key += (patch.take(grows) * n_vertices).repeat(3)
+        key = _once(key, vertex_marks)
+        vertices.append(key)
+        patch, vertex = np.divmod(key, n_vertices)
+    found = np.sort(np.concatenate(faces))
+    face_marks[found] = -1
+    vertex_marks[np.concatenate(vertices)] = -1
+    ends = np.searchsorted(found, np.arange(len(centers) + 1) * n_faces).tolist()
+    return areas, [found[a:b] - k * n_faces for k, (a, b) in enumerate(zip(ends[:-1], ends[1:], strict=True))]
+
+
+def _once(keys: Ints, marks: NDArray[np.int32]) -> Ints:
+    """Each of the keys without a mark once, without sorting; then they have one."""
+    keys = keys.take(np.flatnonzero(marks.take(keys) < 0))
+    place = np.arange(len(keys), dtype=np.int32)
+    marks[keys] = place
+    return keys.take(np.flatnonzero(marks.take(keys) == place))
+
+
+class _Centroids:
+    """The centroids of all triangles, sorted along an axis, so that few are looked at to find the nearest ones."""
+
+    def __init__(self, mesh: PatchMesh) -> None:
+        a, b, c = (mesh.vertices.take(mesh.triangles[:, k], axis=0) for k in range(3))
+        self._areas, self._places = mesh.areas, (a + b + c) / 3
+        self._axis = int(np.argmax(np.ptp(self._places, axis=0)))
+        self._order = np.argsort(self._places[:, self._axis])
+        self._along = self._places[self._order, self._axis]
+        self._taken = np.zeros(len(self._areas), bool)
+
+    def nearest(self, center: Floats, taken: Ints, wanted: float) -> Ints:
+        """Those nearest to the center, but for those taken, whose areas together reach the wanted one, or all."""
+        self._taken[taken] = True
+        left = len(self._areas) - len(taken)
+        reach = wanted
+        while True:
+            width = np.sqrt(reach) * (1 + AREA_ROUNDING)
+            first, last = np.searchsorted(self._along, (center[self._axis] - width, center[self._axis] + width))
+            near = np.sort(self._order[first:last])
+            near = near[~self._taken.take(near)]
+            offset = self._places.take(near, axis=0) - center
             squared = dot(offset, offset)
-            rings.append(rest[_nearest(squared[rest], mesh.areas[rest], target - area)])
-        patch_faces = np.sort(np.concatenate(rings))
-        corners = mesh.vertices[mesh.triangles[patch_faces].ravel()]
-        yield Patch(
-            center=center,
-            faces=patch_faces,
-            area=float(mesh.areas[patch_faces].sum()),
-            diagonal=float(np.linalg.norm(corners.max(axis=0) - corners.min(axis=0))),
-            extended=extended,
-        )
+            inside = np.flatnonzero(squared <= reach)
+            near, squared = near.take(inside), squared.take(inside)
+            if len(near) == left or float(self._areas.take(near).sum()) >= wanted:
+                break
+            reach *= 4
+        self._taken[taken] = False
+        near = near.take(np.argsort(squared, kind="stable"))
+        total = np.cumsum(self._areas.take(near))
+        return np.asarray(near[: int(np.searchsorted(total, wanted)) + 1])
 
 
 def _incident_faces(mesh: PatchMesh) -> tuple[Ints, Ints]:
@@ -227,24 +300,3 @@ def _incident_faces(mesh: PatchMesh) -> tuple[Ints, Ints]:
     start = np.zeros(len(mesh.vertices) + 1, np.int64)
     np.cumsum(np.bincount(corners, minlength=len(mesh.vertices)), out=start[1:])
     return incident, start
-
-
-def _once(values: Ints, scratch: Ints) -> Ints:
-    """Each of the values once, without sorting; scratch is any array that they index."""
-    place = np.arange(len(values))
-    scratch[values] = place
-    return values[scratch[values] == place]
-
-
-def _nearest(squared: Floats, areas: Floats, wanted: float) -> Ints:
-    """The rows of least squared distance whose areas together reach the wanted area; all if they never do."""
-    farthest = squared.max(initial=0.0)
-    reach = wanted
-    while True:  # sort no more of them than are needed
-        near = np.flatnonzero(squared <= reach)
-        if reach >= farthest or float(areas[near].sum()) >= wanted:
-            break
-        reach *= 4
-    near = near[np.argsort(squared[near], kind="stable")]
-    total = np.cumsum(areas[near])
-    return near[: int(np.searchsorted(total, wanted)) + 1]

@@ -3,15 +3,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .geometry import Floats, Ints, weighted
+from .geometry import Floats, Ints, cross, lengths, weighted
 from .patches import Patch, PatchMesh
 from .settings import Settings
-from .surface import triangle_normals
 
 PATCH_CAP = 1.1  # V-C: no patch takes more than this many times its even share of the samples
 COUNT_ROUNDING = 1e-6  # a count that reaches a whole number up to rounding has reached it
@@ -39,33 +39,52 @@ def sample_count(patch: Patch, total_area: float, settings: Settings) -> int:
     return int(np.floor(min(share, cap) + COUNT_ROUNDING))
 
 
-def draw_samples(mesh: PatchMesh, patch: Patch, total_area: float, settings: Settings) -> PatchSamples:
-    """Samples of a patch: they depend on the seed, the settings and this patch alone.
+def draw_samples(
+    mesh: PatchMesh, patches: Sequence[Patch], total_area: float, settings: Settings
+) -> list[PatchSamples]:
+    """Samples of each patch: they depend on the seed, the settings and this patch alone.
 
     Face f gets N_f = S_f / S_local N_local samples, floor or ceiling, by systematic resampling; uniform
     barycentric coordinates; offsets along the face normal from N(0, (sigma L)^2): equations (12) and (13).
     """
+    drawn = [_draw(mesh, patch, sample_count(patch, total_area, settings), settings) for patch in patches]
+    # Several patches at once share the cost of numpy's calls.
+    face, first, second, offset = (np.concatenate([each[k] for each in drawn]) for k in range(4))
+    corners = mesh.triangles.take(face, axis=0)
+    a, b, c = (mesh.vertices.take(corners[:, k], axis=0) for k in range(3))
+    positions = weighted(_barycentric(first, second), a, b, c)
+    normals = cross(np.subtract(b, a, order="F"), np.subtract(c, a, order="F"))
+    positions += (offset * (normals.T / lengths(normals))).T
+    ends = np.cumsum([0, *(len(each[0]) for each in drawn)]).tolist()
+    return [
+        PatchSamples(positions[start:end], offset[start:end], face[start:end], each[4])
+        for each, start, end in zip(drawn, ends[:-1], ends[1:], strict=True)
+    ]
+
+
+def _draw(mesh: PatchMesh, patch: Patch, count: int, settings: Settings) -> tuple[Ints, Floats, Floats, Floats, Ints]:
+    """Face, two numbers in [0, 1) and offset of each sample, and the units."""
     rng = np.random.default_rng([settings.seed, patch.center])
-    count = sample_count(patch, total_area, settings)
-    expected = np.cumsum(mesh.areas[patch.faces])
+    expected = np.cumsum(mesh.areas.take(patch.faces))
     expected *= count / expected[-1]
     expected[-1] = count
     upto = np.minimum(np.floor(expected + rng.random()).astype(np.int64), count)
     face = np.repeat(patch.faces, np.diff(upto, prepend=0))
-
-    weights = draw_barycentric(rng, count)
+    first, second = rng.random(count), rng.random(count)
     offset = rng.normal(0.0, settings.sigma * patch.diagonal, count)
-    corners = mesh.triangles.take(face, axis=0)
-    positions = weighted(weights, *(mesh.vertices.take(corners[:, k], axis=0) for k in range(3)))
-    positions += (offset * triangle_normals(mesh.vertices, corners).T).T
     units = np.sort(rng.choice(count, min(settings.color_units, count), replace=False))
-    return PatchSamples(positions, offset, face, units)
+    return face, first, second, offset, units
 
 
 def draw_barycentric(rng: np.random.Generator, count: int) -> Floats:
     """(count, 3) barycentric coordinates, uniform over a triangle."""
-    root, second = np.sqrt(rng.random(count)), rng.random(count)
-    return np.stack([1 - root, root * (1 - second), root * second], axis=1)
+    return _barycentric(rng.random(count), rng.random(count))
+
+
+def _barycentric(first: Floats, second: Floats) -> Floats:
+    """(n, 3) from two numbers in [0, 1) each."""
+    root = np.sqrt(first)
+    return np.stack([1 - root, root * (1 - second), root * second]).T
 
 
 def triangles_evenly(areas: Floats, within: Floats) -> Ints:

@@ -71,7 +71,7 @@ def test_faces_get_floor_or_ceiling_of_their_share(seed: int, patches: int) -> N
     mesh = finish(build_patch_mesh(surface((positions, triangles)), patches))
     settings = Settings(samples=64 * patches, patches=patches, seed=seed)
     for patch in patches_of(mesh, settings)[:3]:
-        drawn = draw_samples(mesh, patch, mesh.area, settings)
+        drawn = draw_samples(mesh, [patch], mesh.area, settings)[0]
         count = sample_count(patch, mesh.area, settings)
         assert len(drawn.positions) == len(drawn.offset) == len(drawn.face) == count
         expected = mesh.areas[patch.faces] / patch.area * count
@@ -87,7 +87,7 @@ def test_samples_stand_over_their_faces(seed: int) -> None:
     mesh = finish(build_patch_mesh(surface(sphere()), 5))
     settings = Settings(samples=640, patches=5, seed=seed)
     patch = patches_of(mesh, settings)[seed % 5]
-    drawn = draw_samples(mesh, patch, mesh.area, settings)
+    drawn = draw_samples(mesh, [patch], mesh.area, settings)[0]
     corners = mesh.vertices[mesh.triangles[drawn.face]]
     foot = drawn.positions - drawn.offset[:, None] * triangle_normals(mesh.vertices, mesh.triangles[drawn.face])
     for point, triangle in zip(foot, corners, strict=True):
@@ -100,7 +100,7 @@ def big_draw(seed: int = 0, sigma: float = 0.05) -> tuple[PatchMesh, Patch, Patc
     mesh = finish(build_patch_mesh(surface(TETRAHEDRON), 1))
     settings = Settings(samples=40_000, patches=1, seed=seed, sigma=sigma)
     patch = patches_of(mesh, settings)[0]
-    return mesh, patch, draw_samples(mesh, patch, mesh.area, settings)
+    return mesh, patch, draw_samples(mesh, [patch], mesh.area, settings)[0]
 
 
 def test_offsets_are_normal_with_sigma_diagonals() -> None:
@@ -130,7 +130,7 @@ def test_faces_get_their_share_on_average() -> None:
     mesh = finish(build_patch_mesh(surface(cube(6)), 1))
     settings = Settings(samples=100, patches=1)
     patch = patches_of(mesh, settings)[0]
-    draws = [draw_samples(mesh, patch, mesh.area, settings.with_seed(seed)).face for seed in range(400)]
+    draws = [draw_samples(mesh, [patch], mesh.area, settings.with_seed(seed))[0].face for seed in range(400)]
     mean = np.bincount(np.concatenate(draws), minlength=len(mesh.triangles)) / len(draws)
     np.testing.assert_allclose(mean, mesh.areas / mesh.area * 100, atol=0.12)
 
@@ -152,7 +152,7 @@ def test_a_patchs_samples_depend_on_seed_and_center_alone() -> None:
     centers = np.array(list(choose_centers(mesh.vertices, SMALL)))
 
     def draw(order: Ints, settings: Settings = SMALL) -> dict[int, PatchSamples]:
-        return {p.center: draw_samples(mesh, p, mesh.area, settings) for p in grow_patches(mesh, order, 10)}
+        return {p.center: draw_samples(mesh, [p], mesh.area, settings)[0] for p in grow_patches(mesh, order, 10)}
 
     every, few = draw(centers), draw(centers[[7, 2]])
     for center in few:
@@ -170,7 +170,7 @@ def test_color_units_are_drawn_without_replacement(wanted: int) -> None:
     mesh = finish(build_patch_mesh(surface(cube(3)), 10))
     settings = replace(SMALL, color_units=wanted)
     for patch in patches_of(mesh, settings):
-        drawn = draw_samples(mesh, patch, mesh.area, settings)
+        drawn = draw_samples(mesh, [patch], mesh.area, settings)[0]
         units = drawn.units.tolist()
         assert len(units) == min(wanted, len(drawn.positions))
         assert units == sorted(set(units))
@@ -182,9 +182,9 @@ def test_a_patch_without_samples_is_empty_and_nothing_worse() -> None:
     """The least permitted density rules it out in a run; the parts bear it."""
     mesh = finish(build_patch_mesh(surface(cube(2)), 1))
     patch = Patch(0, np.array([3, 5]), 1e-9, 0.5, False)
-    drawn = draw_samples(mesh, patch, mesh.area, Settings(samples=32, patches=1))
+    drawn = draw_samples(mesh, [patch], mesh.area, Settings(samples=32, patches=1))[0]
     assert len(drawn.positions) == len(drawn.units) == 0
-    full = draw_samples(mesh, patches_of(mesh, SMALL)[0], mesh.area, SMALL)
+    full = draw_samples(mesh, [patches_of(mesh, SMALL)[0]], mesh.area, SMALL)[0]
     joined = join_samples([drawn, full, drawn])
     assert joined.start.tolist() == [0, 0, len(full.offset), len(full.offset)]
     assert set(joined.patch.tolist()) == {1}
@@ -192,7 +192,7 @@ def test_a_patch_without_samples_is_empty_and_nothing_worse() -> None:
 
 def test_joined_samples_are_patch_after_patch() -> None:
     mesh = finish(build_patch_mesh(surface(cube(3)), 10))
-    parts = [draw_samples(mesh, patch, mesh.area, SMALL) for patch in patches_of(mesh, SMALL)]
+    parts = [draw_samples(mesh, [patch], mesh.area, SMALL)[0] for patch in patches_of(mesh, SMALL)]
     joined = join_samples(parts)
     assert joined.patch.dtype == np.int32
     assert joined.start[-1] == len(joined.positions) == len(joined.offset) == len(joined.unit)
