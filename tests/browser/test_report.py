@@ -191,6 +191,14 @@ def test_the_table_is_sorted_by_a_click_and_by_a_key(page: Page, report: Path) -
     assert open_pair(page) == table(page)[-1] and page.run("document.querySelector('.tile').offsetHeight") > 0
 
 
+def test_heat_maps_are_not_said_to_be_alike(page: Page, report: Path) -> None:
+    page.open(report, width=1280)
+    note = "document.querySelector('.of-heat.note').offsetHeight > 0"
+    assert page.run(note) is False
+    page.click("[data-show=heat]")
+    assert page.run(note) is True and page.run("document.querySelector('.level .of-heat').offsetHeight") > 0
+
+
 def test_filters_and_search(page: Page, report: Path) -> None:
     page.open(report, width=1280)
     page.click("[data-filter=failed]")

@@ -22,6 +22,7 @@ SORTS = {
     "texture": "Texture",
 }  # fmt: skip
 SHOWS = {"lod": "LODs", "heat": "Heat Maps", "table": "Table"}
+_OWN_RANGE = "Each heat map has a range of its own: it shows where that LOD is worst, not which LOD is."
 # Filters besides LEVELS, by what a row's flags hold.
 FLAGS = {"low": "Below Threshold", "warned": "With Warnings", "failed": "Not Scored"}
 
@@ -123,6 +124,8 @@ def common_facts(overview: Overview) -> str:
 
 def chains(overview: Overview) -> Iterator[str]:
     """Each reference beside its levels, with the curves."""
+    if len(overview.lines) > 1:
+        yield f'<p class="of-heat note">{_OWN_RANGE}</p>\n'
     yield '<div class="chains">\n'
     for number, chain in enumerate(overview.chains, 1):
         yield _chain(number, chain, overview)

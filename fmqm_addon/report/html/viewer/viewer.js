@@ -172,7 +172,7 @@ fmqmViewer.show = (() => {
         element(
           "span",
           { className: "viewer-scale" },
-          element("span", { textContent: number(layer.low) }),
+          element("span", { textContent: (layer.values && layer.low > 0 ? "≤ " : "") + number(layer.low) }),
           bar,
           element("span", { textContent: number(layer.high) + (layer.name === "SDF_DIFFERENCE" ? " scene units" : "") }),
         ),
