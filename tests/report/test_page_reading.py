@@ -64,3 +64,11 @@ def test_what_one_pair_has_no_use_for_is_not_there() -> None:
     assert ["hidden" in attributes for page in (one, two) for _, attributes in page.tags
             if attributes.get("class") == "toolbar"] == [True, False]  # fmt: skip
     assert "1 is the same" in one.text and "1 is the same" not in Page(record(score=None)).text
+
+
+def test_a_sentence_runs_from_left_to_right_though_a_name_does_not() -> None:
+    name = "\u0628\u0642\u0631\u0629.glb"
+    said = [f"{name}: {what}" for what in ("it is open", "its images are alike")]
+    failed = record(name, score=None, error=f"{name}: is broken; repair it")
+    html = Page(record(name, warnings=said[:1], notes=said[1:]), record(), failed).html
+    assert [html.count(f'<bdi dir="ltr">{text}</bdi>') for text in (*said, failed["error"])] == [1, 1, 2]

@@ -13,7 +13,7 @@ from ..numbers import score_text
 from ..visual.colormap import score_colors
 from ..words import LABELS, LOD
 from .chain_curve import Level, curve_svg
-from .fragments import bar, count_text, css, image, name_text, text
+from .fragments import bar, count_text, css, image, name_text, sentence, text
 from .overview import LEVELS, Chain, Line, Overview
 from .size_curve import chain_sizes
 
@@ -63,7 +63,7 @@ def look_first(overview: Overview) -> str:
         return '<p class="note">Nothing stands out: no LOD can be told from its original.</p>\n'
     items = "".join(
         f'<li><a href="#pair-{line.number}" title="{escape(line.paths)}">{_thumbnail(line, "heat")}'
-        f"<span><b>{name_text(line.name)}</b><span>{text(line.reason)}</span></span></a></li>"
+        f"<span><b>{name_text(line.name)}</b><span>{sentence(line.reason)}</span></span></a></li>"
         for line in first
     )
     return (
@@ -111,7 +111,9 @@ def flags_of(line: Line) -> list[str]:
 
 def common_facts(overview: Overview) -> str:
     """What all scored pairs have in common, once."""
-    parts = [f"<li>{text(said)}</li>" for group in ("warnings", "words", "notes") for said in overview.common[group]]
+    parts = [
+        f"<li>{sentence(said)}</li>" for group in ("warnings", "words", "notes") for said in overview.common[group]
+    ]
     if overview.least:
         least = " and ".join(
             f"{LABELS.get(name, name.replace('_', ' '))} {value:g}" for name, value in overview.least.items()
@@ -156,7 +158,9 @@ def _tile(line: Line, chain: Chain, overview: Overview) -> str:
         f'<span class="thumb">{pictures}</span>{name}</a>'
     )
     if line.error is not None:
-        return f'<li class="level" data-number="{line.number}">{link}<p class="bad short">{text(line.error)}</p></li>'
+        return (
+            f'<li class="level" data-number="{line.number}">{link}<p class="bad short">{sentence(line.error)}</p></li>'
+        )
     scores = "".join(
         f'<dt>{LABELS[column]}</dt><dd>{bar(value)}</dd><dd class="number">{score_text(value)}</dd>'
         for column, value in (("FMQM", line.fmqm), ("perceived", line.perceived))

@@ -30,6 +30,11 @@ def text(text: object) -> str:
     return f"<bdi>{escape(str(text))}</bdi>"
 
 
+def sentence(said: object) -> str:
+    """English words as HTML; they run from left to right, whatever name they begin with."""
+    return f'<bdi dir="ltr">{escape(str(said))}</bdi>'
+
+
 def name_text(name: str) -> str:
     """A name as HTML, as text() has it, that may go on in a new line behind what joins its parts."""
     return f"<bdi>{_JOINTS.sub(_BREAK, escape(name))}</bdi>"

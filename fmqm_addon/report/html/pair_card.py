@@ -16,7 +16,7 @@ from ..records import PERCEIVED, SHOWN, shown_score, value_of
 from ..trust_table import Report, trust_lines
 from ..words import LABELS, LOD, ORIGINAL
 from .first_screen import level_mark
-from .fragments import MEGABYTE, bar, folded, name_text, scrolled, text
+from .fragments import MEGABYTE, bar, folded, name_text, scrolled, sentence, text
 from .histogram import histogram_svg
 from .overview import Overview
 from .size_curve import size_panel
@@ -41,12 +41,12 @@ def pair_card(number: int, record: Record, overview: Overview) -> str:
     if missed := shortfall(record):
         parts.append(f'<p class="bad">Too low: {missed}.</p>')
     if record["error"]:
-        parts.append(f'<p class="bad">Not scored: {text(record["error"])}</p>')
+        parts.append(f'<p class="bad">Not scored: {sentence(record["error"])}</p>')
     else:
         words = _rest(sentences(short), overview.common["words"])
-        parts.append(f'<p class="words">{text(" ".join(words))}</p>')
+        parts.append(f'<p class="words">{sentence(" ".join(words))}</p>')
     if warnings := _rest(record["warnings"], overview.common["warnings"]):
-        items = "".join(f"<li>{text(warning)}</li>" for warning in warnings)
+        items = "".join(f"<li>{sentence(warning)}</li>" for warning in warnings)
         parts.append(f'<ul class="warnings" aria-label="Warnings">{items}</ul>')
     parts.append(viewer_markup(record.get("viewer"), name))
     if pictures:
@@ -59,7 +59,7 @@ def pair_card(number: int, record: Record, overview: Overview) -> str:
     if record["parts"]:
         parts.append(_parts(record["parts"]))
     if notes := _rest(record["notes"], overview.common["notes"]):
-        parts.append(folded("Notes", f"<ul>{''.join(f'<li>{text(note)}</li>' for note in notes)}</ul>"))
+        parts.append(folded("Notes", f"<ul>{''.join(f'<li>{sentence(note)}</li>' for note in notes)}</ul>"))
     if record.get("trust"):
         parts.append(_trust(record["trust"]))
     return f'<article class="card pair" id="pair-{number}" aria-labelledby="name-{number}">{"".join(parts)}</article>\n'
