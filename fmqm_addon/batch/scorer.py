@@ -191,13 +191,13 @@ class _Scorer:
         findings: dict[str, Any] = {}
         surfaces, result = (answer.reference, answer.comparison.distorted), answer.comparison.result
         if self._options.report:
+            from ..report.heat import side_of_loss
             from ..report.html.pictures import picture_stem, write_pair_pictures
 
+            judge, side = self._options.judge, side_of_loss(surfaces[0], result, self._options.judge)
             stem = picture_stem(row.reference, row.id, row.distorted)
-            findings["pictures"] = write_pair_pictures(
-                self._options.report, stem, *surfaces, result, self._options.judge
-            )
-            findings["viewer"] = self._viewer(row, stem, answer)
+            findings["pictures"] = write_pair_pictures(self._options.report, stem, *surfaces, result, judge, side)
+            findings["viewer"] = self._viewer(row, stem, answer, side)
         if self._options.explain or self._options.report:
             findings["where"] = where(answer.reference, result)
         if answer.attribution is not None:
@@ -209,9 +209,8 @@ class _Scorer:
             findings["screen_size"] = size_record(sized)
         return findings
 
-    def _viewer(self, row: Row, stem: str, answer: PairResult) -> dict[str, str]:
+    def _viewer(self, row: Row, stem: str, answer: PairResult, side: tuple[float, float]) -> dict[str, str]:
         """What can be turned around on the page; of the reference once for its group."""
-        from ..report.heat import side_of_loss
         from ..report.html.pictures import picture_stem
         from ..report.html.viewer.files import write_pair_data, write_reference_data
 
@@ -220,7 +219,6 @@ class _Scorer:
             own = picture_stem(row.ref_texture, row.reference)
             self._reference_file = write_reference_data(folder, own, answer.reference)
         judge, result = self._options.judge, comparison.result
-        side = side_of_loss(answer.reference, result, judge)
         return write_pair_data(folder, stem, self._reference_file, comparison.distorted, result, judge, side)
 
     def _screen_sizes(self, reference: AssetMesh) -> ScreenSizes | None:

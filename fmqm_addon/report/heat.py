@@ -11,6 +11,7 @@ import numpy as np
 from ..comparison.judge import Judge
 from ..metric.evaluation import Result
 from ..metric.geometry import Floats, Ints
+from ..metric.queries import opened
 from ..metric.surface import Surface
 from .render import AZIMUTH, BACKGROUND, ELEVATION, HIDDEN_BEHIND, direction_towards
 from .visual.colormap import score_colors
@@ -75,7 +76,8 @@ def side_of_loss(reference: Surface, result: Result, judge: Judge) -> tuple[floa
     facing = np.maximum(normals @ towards.T, 0)
     ahead = np.argwhere(facing > 0)
     directions = -towards[ahead[:, 1]]
-    _, hit = reference.query.first_hit(result.patch_centers[ahead[:, 0]] - _BEFORE * directions, directions)
+    with opened(reference.query):
+        _, hit = reference.query.first_hit(result.patch_centers[ahead[:, 0]] - _BEFORE * directions, directions)
     seen = np.zeros_like(facing)
     seen[ahead[:, 0], ahead[:, 1]] = hit > _BEFORE - HIDDEN_BEHIND
     shown = loss @ (facing * seen)

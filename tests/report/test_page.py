@@ -25,6 +25,7 @@ from fmqm_addon.metric.surface import MeshArrays, Surface, prepare_surface
 from fmqm_addon.metric.texture import Material, PlainColor, Texture
 from fmqm_addon.report import render as rendering
 from fmqm_addon.report.criteria import ANYTHING, Criteria
+from fmqm_addon.report.heat import FRONT, side_of_loss
 from fmqm_addon.report.html import pictures as pair_pictures
 from fmqm_addon.report.html.chain_curve import Level, curve_svg
 from fmqm_addon.report.html.page import page_parts, write_page
@@ -111,7 +112,8 @@ def test_pictures_of_a_pair(tmp_path: Path) -> None:
     image = pytest.importorskip("PIL.Image")
     reference, distorted, result = compared(8, FEW)
     open_report_folder(str(tmp_path))
-    made = write_pair_pictures(str(tmp_path), "pair", reference, distorted, result, Judge.FMQM)
+    side = side_of_loss(reference, result, Judge.FMQM)
+    made = write_pair_pictures(str(tmp_path), "pair", reference, distorted, result, Judge.FMQM, side)
     assert json.loads(json.dumps(made, allow_nan=False)) == json.loads(json.dumps(made))
     assert made["triangles"] == [128, 2] and made["texture_bytes"] == [16, 16]
     worst = [patch["FMQM"] for patch in made["worst"]]
@@ -140,7 +142,7 @@ def test_equal_surfaces_have_no_worst_patches(tmp_path: Path) -> None:
     open_report_folder(str(tmp_path))
     same = np.ones_like(result.patch_scores)
     made = write_pair_pictures(
-        str(tmp_path), "pair", reference, reference, replace(result, patch_scores=same), Judge.FMQM
+        str(tmp_path), "pair", reference, reference, replace(result, patch_scores=same), Judge.FMQM, FRONT
     )
     assert made["worst"] == []
     assert "None: every patch is like the original" in Page(record(score=1.0, pictures=made)).text

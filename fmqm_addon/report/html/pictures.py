@@ -19,10 +19,9 @@ from ...comparison.places import place_name
 from ...metric.errors import FileError, OutputError
 from ...metric.evaluation import Result
 from ...metric.geometry import Floats
-from ...metric.queries import opened
 from ...metric.surface import Surface
 from ..atomic_files import check_writable, replaced
-from ..heat import FRONT, heat_of, side_of_loss
+from ..heat import FRONT, heat_of
 from ..picture_files import SUFFIXES, encode, require_encoder, shrunk
 from ..render import Camera, Pixels, is_seen, natural_aspect, render, render_all
 from ..texture_memory import texture_bytes
@@ -83,14 +82,20 @@ def picture_stem(*parts: str) -> str:
 
 
 def write_pair_pictures(
-    folder: str, stem: str, reference: Surface, distorted: Surface, result: Result, judge: Judge
+    folder: str,
+    stem: str,
+    reference: Surface,
+    distorted: Surface,
+    result: Result,
+    judge: Judge,
+    side: tuple[float, float],
 ) -> dict[str, Any]:
     """Both surfaces and the heat map, from the side of the loss and from the front, and the worst patches in close-up.
 
     The heat map's colors and the worst patches are the judge's.
 
     Args:
-        folder: of the report, made by open_report_folder. stem: by picture_stem.
+        folder: of the report, made by open_report_folder. stem: by picture_stem. side: by heat.side_of_loss.
 
     Returns:
         What JSON can hold, for write_page: paths relative to the folder, with / in between, and what the captions say.
@@ -99,27 +104,24 @@ def write_pair_pictures(
         OutputError: a picture cannot be written.
     """
     heat = heat_of(reference, result, judge)
-    with opened(reference.query):
-        loss = side_of_loss(reference, result, judge)
-        sides = {FRONT_VIEW: FRONT} if loss == FRONT else {LOSS: loss, FRONT_VIEW: FRONT}
-        views = [_View(name, *_framed(reference, distorted, side)) for name, side in sides.items()]
-        close_ups = _worst(result, judge)
-        normals = corner_normals(reference)
-        drawn: dict[str, Pixels] = {}
-        for view in views:
-            own, painted = render_all(reference, view.camera, view.size, (None, heat.paint), normals)
-            drawn |= {f"{view.name}-reference": own, f"{view.name}-heat": painted}
-        for each in close_ups:
-            seed = result.patch_centers[each.worst.patch]
-            each.marks.extend(
-                view.camera.place_of(seed) if is_seen(reference, view.camera, seed) else None for view in views
-            )
-        drawn |= _drawn_close_ups("reference", reference, close_ups, normals)
-    with opened(distorted.query):
-        normals = corner_normals(distorted)
-        for view in views:
-            drawn[f"{view.name}-distorted"] = render(distorted, view.camera, view.size, normals=normals)
-        drawn |= _drawn_close_ups("distorted", distorted, close_ups, normals)
+    sides = {FRONT_VIEW: FRONT} if side == FRONT else {LOSS: side, FRONT_VIEW: FRONT}
+    views = [_View(name, *_framed(reference, distorted, each)) for name, each in sides.items()]
+    close_ups = _worst(result, judge)
+    for each in close_ups:
+        seed = result.patch_centers[each.worst.patch]
+        each.marks.extend(
+            view.camera.place_of(seed) if is_seen(reference, view.camera, seed) else None for view in views
+        )
+    drawn: dict[str, Pixels] = {}
+    normals = corner_normals(reference)
+    for view in views:
+        own, painted = render_all(reference, view.camera, view.size, (None, heat.paint), normals)
+        drawn |= {f"{view.name}-reference": own, f"{view.name}-heat": painted}
+    drawn |= _drawn_close_ups("reference", reference, close_ups, normals)
+    normals = corner_normals(distorted)
+    for view in views:
+        drawn[f"{view.name}-distorted"] = render(distorted, view.camera, view.size, normals=normals)
+    drawn |= _drawn_close_ups("distorted", distorted, close_ups, normals)
     # The meshes from the front, so that levels can be compared; the heat map from where it says most.
     of_views = {**dict.fromkeys(MESHES, FRONT_VIEW), "heat": views[0].name}
     thumbnails = {f"thumbnail-{kind}": _smaller(drawn[f"{view}-{kind}"]) for kind, view in of_views.items()}

@@ -77,7 +77,7 @@ def _record(folder: str, pair: ScoredPair, judge: Judge, files: dict[int, Refere
             files[id(reference)] = write_reference_data(folder, own, reference)
         side = side_of_loss(reference, result, judge)
         findings = {
-            "pictures": write_pair_pictures(folder, stem, reference, distorted, result, judge),
+            "pictures": write_pair_pictures(folder, stem, reference, distorted, result, judge, side),
             "viewer": write_pair_data(folder, stem, files[id(reference)], distorted, result, judge, side),
             "where": where(reference, result),
         }
