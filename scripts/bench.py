@@ -4,7 +4,8 @@
     python scripts/bench.py [--growth] [--case REFERENCE DISTORTED] [--decimated REFERENCE] [--batch] ...
 
 Without cases it measures generated surfaces. Each pair is scored in a process of its own, as a user would; "whole" is
-that process from its start to its end, in floors, and "1 core" how many times as long its fields take on one core.
+that process from its start to its end, in floors, "1 core" how many times as long its fields take on one core, and
+"step" the longest step of the stepper, building trees apart: between steps the window is drawn, and Esc heard.
 The floor is the time of plain Python loops of nearest-point and ray-parity queries on both surfaces, along
 the same curve, with the tightest bounds there can be: nothing that asks the trees less can be faster.
 """
@@ -66,7 +67,7 @@ def main() -> int:
     print(
         f"{'pair':34}{'triangles':>10}"
         + "".join(f"{stage:>9}" for stage in STAGES)
-        + "    floor  ratio  whole 1 core    peak"
+        + "    floor  ratio  whole 1 core  step    peak"
     )
     with tempfile.TemporaryDirectory() as folder:
         small = str(Path(folder) / "small.blend")
@@ -110,6 +111,7 @@ def measure(name: str, reference: str, distorted: str, samples: int = 200_000) -
         print(f"{name:34}{pair['error']}")
         return
     floor, triangles = map(float, part("floor", reference, distorted, str(samples)).split())
+    longest = float(part("steps", reference, distorted, str(samples)))
     seconds = pair["seconds"]
     alone = float("nan")
     if hasattr(os, "sched_setaffinity"):
@@ -120,7 +122,7 @@ def measure(name: str, reference: str, distorted: str, samples: int = 200_000) -
         finally:
             os.sched_setaffinity(0, cores)
     numbers = "".join(f"{seconds[stage]:9.2f}" for stage in STAGES)
-    ratios = f"{seconds['total'] / floor:7.2f}{whole / floor:7.2f}{alone:7.2f}"
+    ratios = f"{seconds['total'] / floor:7.2f}{whole / floor:7.2f}{alone:7.2f}{longest:6.2f}"
     print(f"{name:34}{triangles:10.0f}{numbers}{floor:9.2f}{ratios}{peak:6.2f} GB", flush=True)
 
 
@@ -194,6 +196,37 @@ def query_floor(reference: str, distorted: str, samples: str) -> None:
     points = result.samples.positions[order]
     seconds = plain_loops(ref, points, result.ref, order) + plain_loops(dist, points, result.dist, order)
     print(seconds, len(ref.triangles))
+
+
+def longest_step(reference: str, distorted: str, samples: str) -> None:
+    """Prints the processor seconds of the longest step of a pair, building trees apart."""
+    from fmqm_addon.blender.files.load import load_asset
+    from fmqm_addon.blender.scene import bvh, node_queries
+    from fmqm_addon.comparison.pair import PairOptions, comparing_pair, measurement_of
+    from fmqm_addon.metric.settings import Settings
+
+    in_trees = 0.0
+
+    class Timed(bvh.BVHQuery):
+        def __init__(self, *args: Any, **flags: Any) -> None:
+            nonlocal in_trees
+            began = time.thread_time()
+            super().__init__(*args, **flags)
+            in_trees += time.thread_time() - began
+
+    node_queries.BVHQuery = Timed  # type: ignore[misc]
+    loaded, options = (
+        [load_asset(path) for path in (reference, distorted)],
+        PairOptions(settings=Settings(samples=int(samples))),
+    )
+    measurement, longest = measurement_of(loaded[0], node_queries.surface_query, options), 0.0
+    for stepper in (measurement.prepare(), comparing_pair(measurement, *loaded, options)):
+        more = True
+        while more:
+            began, trees = time.thread_time(), in_trees
+            more = stepper.step()
+            longest = max(longest, time.thread_time() - began - (in_trees - trees))
+    print(longest)
 
 
 def plain_loops(surface: Surface, points: np.ndarray, fields: Fields, order: np.ndarray) -> float:
@@ -272,7 +305,12 @@ def decimate(reference: str, path: str) -> None:
     bpy.ops.wm.save_as_mainfile(filepath=path)
 
 
-PARTS: dict[str, Callable[..., None]] = {"floor": query_floor, "generate": generate, "decimate": decimate}
+PARTS: dict[str, Callable[..., None]] = {
+    "floor": query_floor,
+    "steps": longest_step,
+    "generate": generate,
+    "decimate": decimate,
+}
 
 
 if __name__ == "__main__":

@@ -17,14 +17,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from .geometry import Floats, Ints, dot
+from .geometry import Floats, Ints
 from .stepper import Progress, Work
 
 # Samples before each one, along a curve, that are looked at: with 16 a quarter is left that needs a ray.
 PREDECESSORS = 16
 # Balls are taken smaller by this much, relative and absolute, for the float32 of the tree that found their radius.
 BALL_SLACK, BALL_MARGIN = 1e-4, 1e-6
-_BATCH = 1 << 15  # samples of a step
+_BATCH = 1 << 14  # samples of a step
 
 
 def followers(points: Floats, distances: Floats) -> Work[Ints]:
@@ -35,6 +35,8 @@ def followers(points: Floats, distances: Floats) -> Work[Ints]:
         distances: (N,) from the surface, not negative.
     """
     radius = np.maximum(distances * (1 - BALL_SLACK) - BALL_MARGIN, 0.0)
+    squares = radius * radius
+    x, y, z = points.T.copy()
     leader = np.arange(len(points))
     for first in range(0, len(points), _BATCH):
         alone = np.arange(first, min(first + _BATCH, len(points)))
@@ -42,9 +44,15 @@ def followers(points: Floats, distances: Floats) -> Work[Ints]:
             if first == 0:
                 alone = alone[alone >= back]
             before = alone - back
-            apart = points.take(alone, axis=0) - points.take(before, axis=0)
-            reach = np.maximum(radius.take(alone), radius.take(before))
-            together = dot(apart, apart) < reach * reach
+            reach = squares.take(alone)
+            np.maximum(reach, squares.take(before), out=reach)
+            apart = np.zeros(len(alone))
+            for axis in (x, z, y):
+                along = axis.take(alone)
+                along -= axis.take(before)
+                along *= along
+                apart += along
+            together = apart < reach
             following = np.flatnonzero(together)
             leader[alone.take(following)] = before.take(following)
             alone = alone.take(np.flatnonzero(~together))

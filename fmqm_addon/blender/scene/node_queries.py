@@ -27,6 +27,7 @@ from .bvh import BVHQuery
 NAME = ".FMQM queries"  # of all that is made here; menus leave out what begins with a dot
 SETTING = "FMQM_QUERIES"  # environment variable: "python" keeps the plain loop
 BATCH = 16384  # questions of a step: some milliseconds, where an evaluation alone takes a third of one
+LARGE = 50_000  # triangles, of which a question takes several times as long
 WORTH_IT = 256  # fewer questions are answered sooner by a tree that is there
 # Beyond, bounds save the plain loop as much as two cores do, and a second tree, to ask again, would take its time and
 # memory. Nodes interpolate a triangle's number in float32, which up to here is exact enough, too.
@@ -52,9 +53,8 @@ class NodeQuery:
     Between `with query.opened()` nodes answer, else, and where they fail, a BVHQuery, which is built when it is needed.
     """
 
-    batch = BATCH
-
     def __init__(self, vertices: Floats, triangles: Ints) -> None:
+        self.batch = BATCH if len(triangles) <= LARGE else BATCH // 2
         self._vertices, self._triangles = vertices, triangles
         self._plain: BVHQuery | None = None
         self._open = self._failed = False
@@ -155,40 +155,64 @@ class _Stage:
         number = mesh.attributes.new("number", "FLOAT", "CORNER")
         arrays.write(number.data, "value", np.arange(1, len(triangles) + 1, dtype=np.float32).repeat(3))
         self._surface = self._stand(mesh)
-        self._clouds: dict[bool, _Cloud] = {}
+        self._clouds: dict[bool, list[_Cloud]] = {}
 
     def ask(self, points: Floats, directions: Floats | None) -> NDArray[np.float32]:
         """(N, 3) for each point the number of a triangle; of rays also the distance, and 1 where they hit."""
-        cloud = self._cloud(directions is not None)
-        mesh = cloud.mesh
-        if len(mesh.vertices) != len(points):
-            mesh.clear_geometry()
-            mesh.vertices.add(len(points))
-            if directions is not None:
-                mesh.attributes.new("direction", "FLOAT_VECTOR", "POINT")
-        arrays.write(mesh.attributes["position"].data, "vector", points.astype(np.float32))
-        if directions is not None:
-            arrays.write(mesh.attributes["direction"].data, "vector", directions.astype(np.float32))
-        mesh.update_tag()
+        clouds = self._clouds_of(directions is not None)[: max(1, len(points) // WORTH_IT)]
+        bounds = [len(points) * k // len(clouds) for k in range(len(clouds) + 1)]
+        asked = list(zip(clouds, map(slice, bounds[:-1], bounds[1:]), strict=True))
+        for cloud, here in asked:
+            _put(cloud.mesh, points[here], None if directions is None else directions[here])
         self._layer.update()
-        answers = cloud.object.evaluated_get(self._layer.depsgraph).data
-        return arrays.read_attribute(answers, "found", "vector", 3, np.float32)
+        found = np.empty((len(points), 3), np.float32)
+        for cloud, here in asked:
+            answers = cloud.object.evaluated_get(self._layer.depsgraph).data
+            found[here] = arrays.read_attribute(answers, "found", "vector", 3, np.float32)
+        return found
 
-    def _cloud(self, rays: bool) -> _Cloud:
-        """The points that ask; only those that do are evaluated."""
+    def _clouds_of(self, rays: bool) -> list[_Cloud]:
+        """The points that ask; only those that do are evaluated.
+
+        Blender evaluates objects on all cores. What asks for nearest points is spread over them in small pieces, too,
+        but rays in pieces of 10,000: these stand in as many objects as there are cores.
+        """
         if rays not in self._clouds:
-            for other in self._clouds.values():
+            for other in (cloud for clouds in self._clouds.values() for cloud in clouds):
                 other.object.hide_viewport = True
-            mesh = bpy.data.meshes.new(NAME)
-            owner = self._stand(mesh)
-            owner.modifiers.new(NAME, "NODES").node_group = _node_group(self._surface, rays)
-            self._clouds = {rays: _Cloud(owner, mesh)}
+            group = _node_group(self._surface, rays)
+            self._clouds = {rays: [self._cloud(group) for _ in range(_cores() if rays else 1)]}
         return self._clouds[rays]
+
+    def _cloud(self, group: bpy.types.NodeTree) -> _Cloud:
+        mesh = bpy.data.meshes.new(NAME)
+        owner = self._stand(mesh)
+        owner.modifiers.new(NAME, "NODES").node_group = group
+        return _Cloud(owner, mesh)
 
     def _stand(self, mesh: bpy.types.Mesh) -> bpy.types.Object:
         owner = bpy.data.objects.new(NAME, mesh)
         self._scene.collection.objects.link(owner)
         return owner
+
+
+def _put(mesh: bpy.types.Mesh, points: Floats, directions: Floats | None) -> None:
+    """Gives a cloud's mesh the points that ask."""
+    if len(mesh.vertices) != len(points):
+        mesh.clear_geometry()
+        mesh.vertices.add(len(points))
+        if directions is not None:
+            mesh.attributes.new("direction", "FLOAT_VECTOR", "POINT")
+    arrays.write(mesh.attributes["position"].data, "vector", points.astype(np.float32))
+    if directions is not None:
+        arrays.write(mesh.attributes["direction"].data, "vector", directions.astype(np.float32))
+    mesh.update_tag()
+
+
+def _cores() -> int:
+    """How many this process may use."""
+    allowed = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return min(allowed, BATCH // WORTH_IT)
 
 
 def _node_group(surface: bpy.types.Object, rays: bool) -> bpy.types.NodeTree:
