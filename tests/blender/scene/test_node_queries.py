@@ -72,6 +72,21 @@ def test_answers_are_those_of_the_plain_loop() -> None:
     assert (distance[~hit] == np.inf).all()
 
 
+@pytest.mark.parametrize("cores", [1, 3])
+def test_rays_are_spread_over_the_cores_however_many_ask(cores: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The pieces of a question before do not answer for those of a smaller one after it."""
+    monkeypatch.setattr(node_queries, "_cores", lambda: cores)
+    vertices, triangles = random_soup(3, 400)
+    plain, nodes = BVHQuery(vertices, triangles), NodeQuery(vertices, triangles)
+    with nodes.opened():
+        for count in (3000, 700, 100, 1, 2999):
+            points = near(count)
+            directions = points / np.linalg.norm(points, axis=1, keepdims=True)
+            assert np.array_equal(nodes.first_hit(points, -directions)[0], plain.first_hit(points, -directions)[0])
+        assert nodes._stage is not None and len(nodes._stage._clouds[True]) == cores
+    assert not nodes._failed and not temporary()
+
+
 MODELS = ("objpng/spot/spot.obj", "objpng/egyptian_cat/egyptian_cat.obj", "objpng/bob/bob.obj", "tree_alpha/scene.gltf")
 
 
