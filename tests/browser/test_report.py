@@ -38,7 +38,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "cut.glb").write_bytes(b"glTF\2\0\0\0\xff\xff\0\0")
     outputs = ("--report", "out", "--json", "out/scores.json")
     (folder / "out").mkdir()
-    done = score("ref.obj", "shaken.obj", "cut.glb", STRANGE, *SMALL, *outputs, cwd=folder)
+    done = score("ref.obj", "shaken.obj", "cut.glb", STRANGE, *SMALL, "--screen-size", *outputs, cwd=folder)
     assert done.returncode == 1 and "cut.glb" in done.stderr
     return folder / "out" / "index.html"
 
