@@ -17,6 +17,7 @@ from ..blender.files.asset_path import split_spec
 from ..metric.errors import FileError, FMQMError, SettingsError
 from ..metric.settings import SETTING_NAMES, Settings, info_of
 from .rows import Row
+from .table_files import readable
 
 REQUIRED = ("reference", "distorted")
 OPTIONAL = ("id", "ref_texture", "texture", "fail_under", "kind", "level")
@@ -100,16 +101,8 @@ def read_manifest(path: str, settings: Settings) -> list[Row]:
     suffix = Path(path).suffix.lower()
     if suffix not in (".csv", ".json"):
         raise SettingsError(f"{path}: a manifest must end in .csv or .json")
-    try:
+    with readable(path):
         plain = _csv_rows(path) if suffix == ".csv" else _json_rows(path)
-    except OSError as error:
-        raise FileError(f"{path}: cannot be read ({error.strerror})") from error
-    except UnicodeDecodeError as error:
-        raise FileError(f'{path}: not in UTF-8; save it so (a spreadsheet\'s "CSV UTF-8")') from error
-    except csv.Error as error:
-        raise FileError(f"{path}: not a CSV file ({error}; are all quotes closed?)") from error
-    except (ValueError, RecursionError) as error:  # json raises ValueError for numbers too long for int
-        raise FileError(f"{path}: not a JSON file ({error})") from error
     rows, taken = [], dict[str, int]()
     for number, values in plain:
         try:

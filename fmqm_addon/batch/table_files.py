@@ -6,7 +6,8 @@ from __future__ import annotations
 import csv
 import json
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import PurePath
 from typing import Any
 
@@ -25,21 +26,32 @@ def read_rows(path: str) -> list[dict[str, Any]]:
     readers: Mapping[str, Callable[[str], list[dict[str, Any]]]] = {".csv": _csv, ".tsv": _csv, ".json": _json}
     if suffix not in readers:
         raise FileError(f"{path}: a table must end in .csv or .json; save a spreadsheet as CSV (UTF-8)")
-    try:
+    with readable(path):
         if os.path.getsize(path) > LARGEST:
             raise FileError(f"{path}: larger than {LARGEST >> 20} MB; a table of scores is wanted")
         rows = readers[suffix](path)
+    if not rows:
+        raise FileError(f"{path}: no rows in it")
+    return rows
+
+
+@contextmanager
+def readable(path: str) -> Iterator[None]:
+    """Reads a CSV or JSON file inside of it.
+
+    Raises:
+        FileError: for what goes wrong there; its text names the file.
+    """
+    try:
+        yield
     except OSError as error:
         raise FileError(f"{path}: cannot be read ({error.strerror})") from error
     except UnicodeDecodeError as error:
         raise FileError(f'{path}: not in UTF-8; save it so (a spreadsheet\'s "CSV UTF-8")') from error
     except csv.Error as error:
         raise FileError(f"{path}: not a CSV file ({error}; are all quotes closed?)") from error
-    except (ValueError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # json raises ValueError for numbers too long for int
         raise FileError(f"{path}: not a JSON file ({error})") from error
-    if not rows:
-        raise FileError(f"{path}: no rows in it")
-    return rows
 
 
 def _csv(path: str) -> list[dict[str, Any]]:

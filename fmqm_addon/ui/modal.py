@@ -18,6 +18,11 @@ TICK = 0.005  # seconds between ticks, for Blender to draw and listen
 REST = 4  # times what a redraw has cost until the next: at most a quarter of the time goes into drawing
 
 
+def scene_of(name_full: str) -> bpy.types.Scene | None:
+    """The scene of such a name, linked ones too; None: it is gone."""
+    return next((scene for scene in bpy.data.scenes if scene.name_full == name_full), None)
+
+
 class SteppedOperator:
     """A part of operators that run a stepper; called from Python they run it at once.
 

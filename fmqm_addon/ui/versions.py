@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import bpy
 
@@ -19,9 +20,10 @@ from ..comparison.pair import PairOptions
 from ..metric.errors import FMQMError
 from ..metric.stepper import Stepper
 from . import session, stale
-from .modal import SteppedOperator
+from .modal import SteppedOperator, scene_of
 from .operators.inputs import reference_of, set_compared, set_reference
 from .operators.measure import asked_of, show_rows, write_row
+from .operators.polls import allowed
 from .properties.items import item_target
 from .properties.rows import row_targets
 
@@ -43,6 +45,12 @@ class Search:
 
 class VersionsOperator(SteppedOperator):
     """A part of operators that make decimated versions of the active object."""
+
+    bl_options: ClassVar = {"UNDO"}  # no REGISTER: adjusting the last operation would search all over again
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return allowed(cls, _why_not(context))
 
     def asked(self, context: bpy.types.Context, options: PairOptions, reading: Reading) -> Search:
         """What the properties ask for.
@@ -69,14 +77,24 @@ class VersionsOperator(SteppedOperator):
         self.stepper = Stepper(attempting(searching))
         return True
 
-    def found(self) -> tuple[bpy.types.Scene, bpy.types.Object, FoundVersions] | None:
+    def keep(
+        self, context: bpy.types.Context, scene: bpy.types.Scene, original: bpy.types.Object, found: FoundVersions
+    ) -> set[str]:
+        """Makes what was found, in one undo step, and reports it."""
+        raise NotImplementedError
+
+    def finish(self, context: bpy.types.Context) -> set[str]:
+        there = self._found()
+        return {"CANCELLED"} if there is None else self.keep(context, *there)
+
+    def _found(self) -> tuple[bpy.types.Scene, bpy.types.Object, FoundVersions] | None:
         """The scene, the original and what was found; None, and the reason is reported: there is nothing to make."""
         result = self.stepper.result
         if isinstance(result, FMQMError):
             self.report({"WARNING"}, str(result))
             return None
         original = next((object_ for object_ in bpy.data.objects if object_.name_full == self._name), None)
-        scene = next((scene for scene in bpy.data.scenes if scene.name_full == self._scene), None)
+        scene = scene_of(self._scene)
         if original is None or scene is None:
             gone = self._name if original is None else "The scene"
             self.report({"WARNING"}, f"{gone} is gone, and what was found with it")
@@ -114,7 +132,7 @@ class VersionsOperator(SteppedOperator):
         return made
 
 
-def why_not(context: bpy.types.Context) -> str:
+def _why_not(context: bpy.types.Context) -> str:
     """Why there is nothing to decimate, for the greyed-out button; "" if there is."""
     active = context.active_object
     if session.job is not None:

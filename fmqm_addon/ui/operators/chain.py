@@ -3,20 +3,18 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import bpy
 
 from ...blender.materials.types import Reading
 from ...blender.scene.lod_names import lod_of_name, without_level_0
+from ...blender.scene.versions import FoundVersions
 from ...comparison.decimation import DecimationGoal
 from ...comparison.judge import Judge
 from ...comparison.pair import PairOptions
 from ...metric.errors import SettingsError
 from .. import stale
 from ..properties.settings import plain
-from ..versions import Search, VersionsOperator, hide, why_not
-from .polls import allowed
+from ..versions import Search, VersionsOperator, hide
 
 
 class FMQM_OT_lod_chain(VersionsOperator, bpy.types.Operator):  # noqa: N801
@@ -26,13 +24,7 @@ class FMQM_OT_lod_chain(VersionsOperator, bpy.types.Operator):  # noqa: N801
         "Copy the active object once for each quality, as _LOD1, _LOD2 and so on, with live Decimate modifiers as "
         "strong as the quality allows; the copies are measured, and hidden behind the original. Esc cancels"
     )
-    bl_options: ClassVar = {"UNDO"}  # no REGISTER: adjusting the last operation would search all over again
-
     noun = "LOD Chain"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return allowed(cls, why_not(context))
 
     def asked(self, context: bpy.types.Context, _: PairOptions, __: Reading) -> Search:
         fmqm, active = context.scene.fmqm, context.active_object
@@ -55,12 +47,10 @@ class FMQM_OT_lod_chain(VersionsOperator, bpy.types.Operator):  # noqa: N801
             taken.name = f"{taken.name} (deleted)"
         return Search(DecimationGoal(qualities, judge=Judge[fmqm.judge]), base, suffixes, called)
 
-    def finish(self, context: bpy.types.Context) -> set[str]:
+    def keep(
+        self, context: bpy.types.Context, scene: bpy.types.Scene, original: bpy.types.Object, found: FoundVersions
+    ) -> set[str]:
         """The LODs and their rows, in one undo step."""
-        there = self.found()
-        if there is None:
-            return {"CANCELLED"}
-        scene, original, found = there
         made = self.make(context, scene, original, found)
         hidden = hide(context, made, original)
         counts = ", ".join(f"{each.outcome.triangles:,}" for each in found.versions)

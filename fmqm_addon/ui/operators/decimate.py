@@ -3,21 +3,19 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import bpy
 
 from ...blender.materials.color_images import falling_sides
 from ...blender.materials.types import Reading
 from ...blender.scene.parts import parts_of
+from ...blender.scene.versions import FoundVersions
 from ...comparison.decimation import DecimationGoal, Step, TargetResult
 from ...comparison.judge import Judge
 from ...comparison.pair import PairOptions
 from ...report.numbers import score_text
 from ..properties.decimate import FMQMDecimate
 from ..properties.settings import plain
-from ..versions import Search, VersionsOperator, hide, why_not
-from .polls import allowed
+from ..versions import Search, VersionsOperator, hide
 
 _LARGEST = 10**9  # pixels: textures as they are come before all smaller ones
 
@@ -29,13 +27,7 @@ class FMQM_OT_decimate(VersionsOperator, bpy.types.Operator):  # noqa: N801
         "Copy the active object with a live Decimate modifier, as strong as the target allows, and measure the copy. "
         "The original stays as it is and is hidden behind it. Esc cancels"
     )
-    bl_options: ClassVar = {"UNDO"}  # no REGISTER: adjusting the last operation would search all over again
-
     noun = "Decimation"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return allowed(cls, why_not(context))
 
     def asked(self, context: bpy.types.Context, _: PairOptions, reading: Reading) -> Search:
         fmqm, active = context.scene.fmqm, context.active_object
@@ -51,12 +43,10 @@ class FMQM_OT_decimate(VersionsOperator, bpy.types.Operator):  # noqa: N801
         name = f" {judge.column} {score_text(goal.targets[0], places=2)}"
         return Search(goal, active.name, (_free(active.name, name),), active.name)
 
-    def finish(self, context: bpy.types.Context) -> set[str]:
+    def keep(
+        self, context: bpy.types.Context, scene: bpy.types.Scene, original: bpy.types.Object, found: FoundVersions
+    ) -> set[str]:
         """The copy, its row and the path that the search took, in one undo step."""
-        there = self.found()
-        if there is None:
-            return {"CANCELLED"}
-        scene, original, found = there
         searched, judge = found.result.results[0], self.search.goal.judge
         _write_path(scene.fmqm.decimate, original.name, searched, judge)
         if not found.versions:

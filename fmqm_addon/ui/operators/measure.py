@@ -19,7 +19,7 @@ from ...metric.errors import FMQMError
 from ...metric.geometry import Floats
 from ...report.trust_table import trust_dict
 from .. import session, stale, stored_text
-from ..modal import SteppedOperator
+from ..modal import SteppedOperator, scene_of
 from ..properties.items import item_target
 from ..properties.rows import row_targets
 from ..properties.scene import FMQMScene
@@ -77,7 +77,7 @@ class FMQM_OT_measure(SteppedOperator, bpy.types.Operator):  # noqa: N801
 
     def finish(self, context: bpy.types.Context) -> set[str]:
         """All rows at once: one undo step."""
-        scene = next((scene for scene in bpy.data.scenes if scene.name_full == self._scene), None)
+        scene = scene_of(self._scene)
         if scene is None:
             self.report({"WARNING"}, "The scene is gone, and the scores with it")
             return {"CANCELLED"}

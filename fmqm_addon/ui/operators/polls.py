@@ -42,3 +42,11 @@ def cannot_compare(context: bpy.types.Context) -> str:
     """Why a view cannot show the two of the chosen row as they are now; "" where it can."""
     reason = no_viewport(context) or why_not(context.scene)
     return reason[:1].upper() + reason[1:]
+
+
+class OfRows:
+    """A part of operators that need results."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return allowed(cls, no_rows(context))

@@ -12,7 +12,7 @@ from ...report.records import table_text
 from ...report.words import LABELS, MEANINGS
 from ..properties.rows import active_row, is_whole, pair_of, row_scores
 from ..view.shown import forget_removed
-from .polls import allowed, no_rows
+from .polls import OfRows
 
 _COLUMNS = [(name, label, MEANINGS[name]) for name, label in LABELS.items()]
 
@@ -22,7 +22,7 @@ def broken_text(count: int) -> str:
     return f"; {count} left out, which cannot be read" if count else ""
 
 
-class FMQM_OT_sort_rows(bpy.types.Operator):  # noqa: N801
+class FMQM_OT_sort_rows(OfRows, bpy.types.Operator):  # noqa: N801
     bl_idname = "fmqm.sort_rows"
     bl_label = "Sort by Score"
     bl_options: ClassVar = {"REGISTER", "UNDO"}
@@ -36,10 +36,6 @@ class FMQM_OT_sort_rows(bpy.types.Operator):  # noqa: N801
     @classmethod
     def description(cls, _: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
         return f"{MEANINGS[properties.column]}.\nClick to sort the results by it, again for the other direction"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return allowed(cls, no_rows(context))
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         fmqm = context.scene.fmqm
@@ -61,15 +57,11 @@ class FMQM_OT_sort_rows(bpy.types.Operator):  # noqa: N801
         return {"FINISHED"}
 
 
-class FMQM_OT_remove_row(bpy.types.Operator):  # noqa: N801
+class FMQM_OT_remove_row(OfRows, bpy.types.Operator):  # noqa: N801
     bl_idname = "fmqm.remove_row"
     bl_label = "Remove Result"
     bl_description = "Remove the chosen row from the results"
     bl_options: ClassVar = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return allowed(cls, no_rows(context))
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         fmqm = context.scene.fmqm
@@ -80,15 +72,11 @@ class FMQM_OT_remove_row(bpy.types.Operator):  # noqa: N801
         return {"FINISHED"}
 
 
-class FMQM_OT_clear_results(bpy.types.Operator):  # noqa: N801
+class FMQM_OT_clear_results(OfRows, bpy.types.Operator):  # noqa: N801
     bl_idname = "fmqm.clear_results"
     bl_label = "Clear Results"
     bl_description = "Remove all rows of the results"
     bl_options: ClassVar = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return allowed(cls, no_rows(context))
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         context.scene.fmqm.rows.clear()
@@ -97,15 +85,11 @@ class FMQM_OT_clear_results(bpy.types.Operator):  # noqa: N801
         return {"FINISHED"}
 
 
-class FMQM_OT_copy_results(bpy.types.Operator):  # noqa: N801
+class FMQM_OT_copy_results(OfRows, bpy.types.Operator):  # noqa: N801
     bl_idname = "fmqm.copy_results"
     bl_label = "Copy as Text"
     bl_description = "Copy the results to the clipboard as a table"
     bl_options: ClassVar = {"INTERNAL"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return allowed(cls, no_rows(context))
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         rows = [row for row in context.scene.fmqm.rows if is_whole(row)]

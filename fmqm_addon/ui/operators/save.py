@@ -16,11 +16,11 @@ from ...report.npz import save_fields
 from ...report.records import csv_text, json_text
 from .. import session, stored_text
 from ..properties.rows import active_row, is_whole, pair_of
-from .polls import allowed, no_rows
+from .polls import OfRows
 from .results import broken_text
 
 
-class FMQM_OT_save_results(bpy.types.Operator):  # noqa: N801
+class FMQM_OT_save_results(OfRows, bpy.types.Operator):  # noqa: N801
     bl_idname = "fmqm.save_results"
     bl_label = "Save Results"
     bl_options: ClassVar = {"INTERNAL"}  # writes a file, changes nothing in the scene
@@ -43,10 +43,6 @@ class FMQM_OT_save_results(bpy.types.Operator):  # noqa: N801
     @classmethod
     def description(cls, _: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
         return str(properties.bl_rna.properties["file_format"].enum_items[properties.file_format].description)
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return allowed(cls, no_rows(context))
 
     def invoke(self, context: bpy.types.Context, _: bpy.types.Event) -> set[str]:
         folder = os.path.dirname(bpy.data.filepath) or os.path.expanduser("~")

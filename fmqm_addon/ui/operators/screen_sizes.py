@@ -19,7 +19,7 @@ from ...metric.stepper import Progress, Stepper, Work, as_part
 from ...screen_size.chain import SizedChain, sizing_chain
 from ...screen_size.records import size_record
 from .. import session, stale
-from ..modal import SteppedOperator
+from ..modal import SteppedOperator, scene_of
 from ..properties.rows import FMQMRow, active_row, row_targets
 from ..properties.settings import pair_options, patterns_of
 from ..sizes import engine_text
@@ -57,7 +57,7 @@ class FMQM_OT_screen_sizes(SteppedOperator, bpy.types.Operator):  # noqa: N801
         return True
 
     def finish(self, _: bpy.types.Context) -> set[str]:
-        scene = next((scene for scene in bpy.data.scenes if scene.name_full == self._scene), None)
+        scene = scene_of(self._scene)
         sized_chain: str | SizedChain = self.stepper.result
         if scene is None or isinstance(sized_chain, str):
             self.report({"WARNING"}, "The scene is gone, and the sizes with it" if scene is None else str(sized_chain))
