@@ -25,8 +25,9 @@ from ..properties.rows import (
     row_stderr,
     settings_name,
 )
-from .sidebar import EDGES, ICON, OfResult, is_narrow, text_width, width, wrapped
+from .sidebar import ICON, OfResult, is_narrow, text_width, width, wrapped
 
+_EDGES = 50  # pixels at scale 1, left and right of what stands in no box
 _SHORT_SPACE = {SPACE_LABELS["location"]: "Origins Aligned"}
 NOT_SEEN = "Normal maps, roughness and lighting are not part of FMQM"
 
@@ -67,7 +68,7 @@ def _draw_scores(column: bpy.types.UILayout, context: bpy.types.Context, row: FM
         if name == "perceived":
             column.separator()
         text = score_text(scores[name], stderr[name] if stderr and not is_narrow(context) else None)
-        room = width(context) - EDGES
+        room = width(context) - _EDGES
         split = column.split(factor=min(0.5, 1 - (text_width(text) + ICON / 2) / room), align=True)
         label = split.row()
         label.alignment = "LEFT"
