@@ -102,7 +102,7 @@ class PartsReport:
 def groupings(surface: Surface) -> Work[tuple[Grouping, ...]]:
     """A surface by objects, connected parts and materials; yields the share done."""
     areas = surface.areas
-    boxes = _boxes(surface)
+    boxes = yield from _boxes(surface)
     yield Progress("", 0.2)
     connected = connected_parts(surface.triangles)
     yield Progress("", 0.6)
@@ -198,14 +198,15 @@ def _numbered(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(numbered)
 
 
-def _boxes(surface: Surface) -> tuple[Floats, Floats]:
-    """(3, T) lowest and highest corner of the box of each triangle."""
+def _boxes(surface: Surface) -> Work[tuple[Floats, Floats]]:
+    """(3, T) lowest and highest corner of the box of each triangle; yields 0."""
     low, high = np.empty((2, 3, len(surface.triangles)))
     corners = [np.ascontiguousarray(corner) for corner in surface.triangles.T]
     for axis, values in enumerate(surface.vertices.T.copy()):
         a, b, c = (values.take(corner) for corner in corners)
         np.minimum(np.minimum(a, b), c, out=low[axis])
         np.maximum(np.maximum(a, b), c, out=high[axis])
+        yield Progress("", 0.0)
     return low, high
 
 

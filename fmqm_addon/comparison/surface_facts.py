@@ -90,8 +90,11 @@ def overlapping_share(uv: Floats, layers: Ints) -> Work[float | None]:
     Args:
         uv: (T, 3, 2) finite texture coordinates. layers: (T,) which texture; only those of one overlap.
     """
-    tile = np.floor(_low(uv))
-    low, high = _low(uv) - tile, _high(uv) - tile
+    low = _low(uv)
+    tile = np.floor(low)
+    low -= tile
+    yield Progress("", 0.3)
+    high = _high(uv) - tile
     shift = np.array(_UV_SHIFT)[:, None]
     yield Progress("", 0.3)
     for side in UV_GRIDS:
@@ -144,6 +147,8 @@ def _uv_facts(uv: Floats, areas: Floats, overlapping: float | None) -> tuple[Fac
 def _textured(surface: Surface) -> tuple[Ints, Floats]:
     """(T,) the material of each triangle that has texture coordinates, else -1; (n, 3, 2) those coordinates."""
     channel = np.array([-1 if material.uv is None else material.uv for material in surface.materials])
+    if channel[0] >= 0 and (channel == channel[0]).all():  # as nearly always, and many times as fast
+        return surface.material, surface.corners[:, :, channel[0] : channel[0] + 2]
     first = channel[surface.material]
     layers = np.where(first >= 0, surface.material, -1)
     rows = np.flatnonzero(first >= 0)
