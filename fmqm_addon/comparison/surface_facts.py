@@ -148,7 +148,7 @@ def _textured(surface: Surface) -> tuple[Ints, Floats]:
     """(T,) the material of each triangle that has texture coordinates, else -1; (n, 3, 2) those coordinates."""
     channel = np.array([-1 if material.uv is None else material.uv for material in surface.materials])
     if channel[0] >= 0 and (channel == channel[0]).all():  # as nearly always, and many times as fast
-        return surface.material, surface.corners[:, :, channel[0] : channel[0] + 2]
+        return surface.material, np.ascontiguousarray(surface.corners[:, :, channel[0] : channel[0] + 2])
     first = channel[surface.material]
     layers = np.where(first >= 0, surface.material, -1)
     rows = np.flatnonzero(first >= 0)
