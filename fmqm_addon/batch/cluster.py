@@ -176,17 +176,20 @@ def _receive(
     wait: float,
 ) -> None:
     """Takes what is done into the journal until all is; gives a part up whose workers are all gone."""
-    completed = distributed.as_completed(list(sent), loop=client.loop)
+    # Results are fetched beside this loop: a finished one whose worker is lost before that is waited for again.
+    completed = distributed.as_completed(list(sent), loop=client.loop, with_results=True, raise_errors=False)
     lost: dict[str, float] = {}  # since when a Python has no worker
     looked = time.monotonic()
     while sent:
-        for future in completed.next_batch(block=False):
+        for future, result in completed.next_batch(block=False):
             if future in sent:
                 _, part = sent.pop(future)
-                _take(future, part, journal, log)
+                _take(result, part, journal, log)
         now = time.monotonic()
         if now - looked > _LOOK:
             looked, there = now, set(_present_workers(client))
+            for future in [each for each in sent if each.status == "error"]:  # lost, then failed: Dask does not tell
+                _take((None, future.exception(), None), sent.pop(future)[1], journal, log)
             for python, workers in pythons.items():
                 if there & set(workers):
                     lost.pop(python, None)
@@ -206,22 +209,26 @@ def _present_workers(client: Any) -> Sequence[str]:
         return []
 
 
-def _take(future: Any, part: Sequence[Task], journal: Journal, log: Log) -> None:
-    """The records of a part that has ended, however it did."""
+def _take(result: Any, part: Sequence[Task], journal: Journal, log: Log) -> None:
+    """The records of a part that has ended, however it did.
+
+    Args:
+        result: a CompletedProcess; (type, exception, traceback) of a task that failed; or a CancelledError.
+    """
     left = {task.key: task for task in part}
-    why = future.status  # cancelled, lost: the scheduler has gone
-    if future.status in ("finished", "error"):
-        why = "it told of no scores"
-        try:
-            lines = future.result().stdout.splitlines()
-        except Exception as error:  # what has happened there, whatever it was
-            lines, why = [], _cause(error)
-        for event in map(parse_line, lines):
-            task = left.pop(event.get("done", ""), None)
-            if task is not None:
-                record = own_record(event, journal.made_by)
-                journal.done(task.key, record)
-                log.scored(record)
+    lines: list[bytes] = []
+    if isinstance(result, subprocess.CompletedProcess):
+        lines, why = result.stdout.splitlines(), "it told of no scores"
+    elif isinstance(result, tuple):
+        why = _cause(result[1])  # what has happened there, whatever it was
+    else:
+        why = "cancelled"  # the scheduler has gone
+    for event in map(parse_line, lines):
+        task = left.pop(event.get("done", ""), None)
+        if task is not None:
+            record = own_record(event, journal.made_by)
+            journal.done(task.key, record)
+            log.scored(record)
     _fail(list(left.values()), why, journal, log)
 
 

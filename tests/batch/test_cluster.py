@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -78,17 +79,13 @@ def test_all_pairs_are_scored_once_though_a_worker_is_killed(
     assets: Path, cluster: tuple[str, list[subprocess.Popen[bytes]]], tmp_path: Path
 ) -> None:
     address, workers = cluster
+    wait_for(address, len(workers))
     command = ["--manifest", "pairs.json", *TINY, "--quiet"]
     outputs = ["--json", "far.json", "--dask", address]
     arguments = [sys.executable, str(SCORE), *command, *outputs]
     run = subprocess.Popen(arguments, cwd=assets, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     journal = assets / "far.json.journal.jsonl"
-    end = time.monotonic() + 60
-    while not journal.exists() or b"done" not in journal.read_bytes():
-        assert run.poll() is None and time.monotonic() < end, run.communicate()[1]
-        time.sleep(0.02)
-    workers[0].kill()
-    before = journal.read_bytes().count(b'{"done"')
+    before = _kill_with_results(workers[:1], run, journal)
     _, told = run.communicate(timeout=120)
     assert run.returncode == 1 and "Traceback" not in told, told
     assert before < len(NAMES), "it was killed in the middle"
@@ -137,6 +134,20 @@ def test_only_workers_with_the_same_code_score(
     assert all(worker.poll() is None for worker in workers)
 
 
+def _kill_with_results(workers: list[subprocess.Popen[bytes]], run: subprocess.Popen[str], journal: Path) -> int:
+    """In the middle, when they hold results that the run has not fetched yet; how many pairs it had till then."""
+    end = time.monotonic() + 60
+    while not journal.exists() or b"done" not in journal.read_bytes():
+        assert run.poll() is None and time.monotonic() < end, run.communicate()[1]
+        time.sleep(0.02)
+    run.send_signal(signal.SIGSTOP)
+    time.sleep(2)
+    for worker in workers:
+        worker.kill()
+    run.send_signal(signal.SIGCONT)
+    return journal.read_bytes().count(b'{"done"')
+
+
 def wait_for(address: str, count: int) -> None:
     with distributed.Client(address, set_as_default=False) as client:
         client.wait_for_workers(count, timeout=30)
@@ -146,9 +157,9 @@ def test_what_comes_back_by_other_code_is_an_error() -> None:
     """Should a worker's checkout change while it scores."""
     pair = pair_record(PairScore("r", "d", patches=200)) | numbers(0.5)
     lines = line_of({"done": "k", "made_by": {"fmqm_code": "other"}, "pair": pair})
-    future = SimpleNamespace(status="finished", result=lambda: SimpleNamespace(stdout=lines))
+    done = subprocess.CompletedProcess([], 0, stdout=lines)
     journal = Journal(made_by={"fmqm_code": "ours"})
-    _take(future, [Task("k", Row("d", "r", "d")), Task("l", Row("e", "r", "e"))], journal, Log("", 2, 2, silent=True))
+    _take(done, [Task("k", Row("d", "r", "d")), Task("l", Row("e", "r", "e"))], journal, Log("", 2, 2, silent=True))
     assert "scored by fmqm_code other instead of ours" in journal.record("k")["error"]
     assert journal.record("l")["error"] == "e: its task failed on the cluster (it told of no scores)"
 
@@ -193,13 +204,7 @@ def test_when_all_workers_are_lost_the_rest_is_an_error(
     arguments = ["--manifest", "pairs.json", *TINY, "--quiet", "--json", "far.json", "--dask", address]
     command = [sys.executable, str(SCORE), *arguments, "--wait-workers", "2"]
     run = subprocess.Popen(command, cwd=assets, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-    journal = assets / "far.json.journal.jsonl"
-    end = time.monotonic() + 60
-    while not journal.exists() or b"done" not in journal.read_bytes():
-        assert run.poll() is None and time.monotonic() < end, run.communicate()[1]
-        time.sleep(0.02)
-    for worker in workers:
-        worker.kill()
+    _kill_with_results(workers, run, assets / "far.json.journal.jsonl")
     _, told = run.communicate(timeout=60)
     assert run.returncode == 1 and "all workers that can score are gone; --resume goes on" in told
     assert "Traceback" not in told
