@@ -167,7 +167,7 @@ def run_batch(reference: str, distorted: str, pairs: int, jobs: int, flags: list
         command = [sys.executable, str(ROOT / "scripts" / "score.py"), "--manifest", str(manifest), *flags]
         outputs = ["--jobs", str(jobs), "--json", str(Path(folder) / "all.json"), "--quiet"]
         began = time.perf_counter()
-        process = subprocess.Popen([*command, *outputs], stdout=subprocess.DEVNULL)
+        process = subprocess.Popen([*command, *outputs], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         peak = 0.0
         while process.poll() is None:
             found = re.search(r"VmHWM:\s+(\d+) kB", Path(f"/proc/{process.pid}/status").read_text(encoding="ascii"))

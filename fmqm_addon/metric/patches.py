@@ -153,26 +153,27 @@ def farthest_points(vertices: Floats, count: int) -> Iterator[int]:
     order = morton_order(vertices)
     padding = -len(order) % _FPS_BLOCK
     order = np.concatenate([order, np.full(padding, order[-1])]).reshape(-1, _FPS_BLOCK)
-    points = vertices[order]  # (blocks, _FPS_BLOCK, 3)
-    low, high = points.min(axis=1), points.max(axis=1)
+    points = vertices.T.take(order, axis=1)  # (3, blocks, _FPS_BLOCK)
+    low, high = points.min(axis=2), points.max(axis=2)
 
     def farthest(squared: Floats, block_max: Floats) -> int:
         tie = block_max.max() * (1 - FPS_TIE) ** 2
         blocks = np.flatnonzero(block_max >= tie)
         return int(order[blocks][squared[blocks] >= tie].min())
 
-    from_mean = ((points - vertices.mean(axis=0)) ** 2).sum(axis=2)
+    from_mean = ((points - vertices.mean(axis=0)[:, None, None]) ** 2).sum(axis=0)
     latest = farthest(from_mean, from_mean.max(axis=1))
     yield latest
     squared = np.full(order.shape, np.inf)
     block_max = np.full(len(order), np.inf)
     for _ in range(count - 1):
-        center = vertices[latest]
+        center = vertices[latest][:, None]
         gap = np.maximum(np.maximum(low - center, center - high), 0)
-        touched = np.flatnonzero((gap * gap).sum(axis=1) < block_max)
-        offset = points[touched] - center
-        squared[touched] = np.minimum(squared[touched], np.einsum("bpc,bpc->bp", offset, offset))
-        block_max[touched] = squared[touched].max(axis=1)
+        touched = np.flatnonzero((gap * gap).sum(axis=0) < block_max)
+        x, y, z = points.take(touched, axis=1) - center[:, None]
+        nearest = np.minimum(squared.take(touched, axis=0), x * x + z * z + y * y)
+        squared[touched] = nearest
+        block_max[touched] = nearest.max(axis=1)
         latest = farthest(squared, block_max)
         yield latest
 

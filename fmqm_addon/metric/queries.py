@@ -192,7 +192,10 @@ def _counting(
 
 
 def _along(origins: Floats, travelled: Floats, directions: Floats, rays: Ints) -> Floats:
-    return origins[rays] + travelled[rays, None] * directions[rays]
+    along = directions.take(rays, axis=0)
+    along *= travelled.take(rays)[:, None]
+    along += origins.take(rays, axis=0)
+    return along
 
 
 def count_crossings_of_all(surface: Surface, origins: Floats, directions: Floats) -> Ints:

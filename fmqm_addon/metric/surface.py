@@ -163,13 +163,14 @@ class Surface:
         source: (T,) int64, the row of each triangle in MeshArrays.
         objects: names, at least one. object: (T,) into objects. rounding: as in MeshArrays, in the metric's frame.
         preparation: what was left out and welded. warnings, notes: as in MeshArrays, and what preparing adds to them.
-        normals: (T, 3, 3) float64, as in MeshArrays.
+        areas: (T,) of the triangles. normals: (T, 3, 3) float64, as in MeshArrays.
     """
 
     name: str
     frame: Frame
     vertices: Floats
     triangles: Ints
+    areas: Floats
     corners: Floats
     material: Ints
     materials: tuple[Material, ...]
@@ -182,11 +183,6 @@ class Surface:
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
     normals: Floats | None = None
-
-    @cached_property
-    def areas(self) -> Floats:
-        """(T,) of the triangles."""
-        return triangle_areas(self.vertices, self.triangles)
 
     def color_at(self, triangle: Ints, barycentric: Floats) -> Floats:
         """Equations (5) to (7): (N, 3) float64 sRGB colors at barycentric (N, 3) places of (N,) triangles."""
@@ -239,18 +235,18 @@ def preparing_surface(mesh: MeshArrays, build_query: QueryBuilder, frame: Frame 
     triangles = np.asarray(mesh.triangles, np.int64).reshape(-1, 3)
     if not len(triangles):
         raise MeshError(f"{mesh.name}: the mesh has no faces; a surface is wanted")
-    source = np.arange(len(triangles))
+    source, areas = np.arange(len(triangles)), np.zeros(len(triangles))
 
     def keep(mask: NDArray[np.bool_], why: str, say: list[str]) -> int:
         """Leaves out the others, and says so; returns how many they are."""
-        nonlocal triangles, source
+        nonlocal triangles, source, areas
         dropped = len(mask) - int(np.count_nonzero(mask))
         if not dropped:
             return 0
         if dropped == len(mask):
             raise MeshError(f"{mesh.name}: all {len(mesh.triangles)} triangles are unusable; the last {dropped} {why}")
         say.append(f"{mesh.name}: {dropped} of {len(mesh.triangles)} triangles left out: they {why}")
-        triangles, source = triangles[mask], source[mask]
+        triangles, source, areas = triangles[mask], source[mask], areas[mask]
         return dropped
 
     not_finite = 0
@@ -266,13 +262,15 @@ def preparing_surface(mesh: MeshArrays, build_query: QueryBuilder, frame: Frame 
     positions, triangles = weld(frame.enter(world), triangles)
     welded = len(world) - len(positions)
     yield Progress("", 0.4)
-    flat = keep(~_is_flat(positions, triangles, frame), "have zero area", notes)
+    areas, is_flat = _areas(positions, triangles, frame)
+    flat = keep(~is_flat, "have zero area", notes)
     yield Progress("", 0.5)
     repeated = keep(_is_first(triangles), "repeat another triangle", notes)
     yield Progress("", 0.6)
     vertices, triangles = _used_only(positions, triangles)
 
-    corners = np.asarray(mesh.corners, np.float64)[source]
+    kept = slice(None) if len(source) == len(mesh.triangles) else source
+    corners = np.asarray(mesh.corners, np.float64)[kept]
     if not np.isfinite(corners).all():
         strange = np.count_nonzero(~np.isfinite(corners).all(axis=(1, 2)))
         warnings.append(f"{mesh.name}: {strange} triangles have UVs or colors that are not finite; taken as 0")
@@ -283,24 +281,27 @@ def preparing_surface(mesh: MeshArrays, build_query: QueryBuilder, frame: Frame 
         frame=frame,
         vertices=vertices,
         triangles=triangles,
+        areas=areas,
         corners=corners,
-        material=np.asarray(mesh.material, np.int64)[source],
+        material=np.asarray(mesh.material, np.int64)[kept],
         materials=mesh.materials,
         source=source,
         objects=mesh.objects or (mesh.name,),
-        object=np.zeros(len(source), np.int64) if mesh.object is None else np.asarray(mesh.object, np.int64)[source],
+        object=np.zeros(len(source), np.int64) if mesh.object is None else np.asarray(mesh.object, np.int64)[kept],
         rounding=mesh.rounding / frame.scale,
         query=build_query(vertices, triangles),
         preparation=Preparation(len(mesh.triangles), not_finite, flat, repeated, welded),
         warnings=tuple(warnings),
         notes=tuple(notes),
-        normals=None if mesh.normals is None else np.asarray(mesh.normals, np.float64)[source],
+        normals=None if mesh.normals is None else np.asarray(mesh.normals, np.float64)[kept],
     )
 
 
 def _used_only(positions: Floats, triangles: Ints) -> tuple[Floats, Ints]:
     used = np.zeros(len(positions), bool)
     used[triangles] = True
+    if used.all():
+        return positions, triangles
     return positions[used], (np.cumsum(used) - 1)[triangles]
 
 
@@ -346,29 +347,28 @@ def is_closed(triangles: Ints) -> bool:
 
 
 def triangle_areas(vertices: Floats, triangles: Ints) -> Floats:
-    return lengths(_area_vectors(vertices, triangles)) / 2
+    return lengths(cross(*_edges(vertices, triangles))) / 2
 
 
 def triangle_normals(vertices: Floats, triangles: Ints) -> Floats:
     """(T, 3) unit normals; the triangles must not be degenerate."""
-    normals = _area_vectors(vertices, triangles)
+    normals = cross(*_edges(vertices, triangles))
     return np.asarray((normals.T / lengths(normals)).T)
 
 
-def _area_vectors(vertices: Floats, triangles: Ints) -> Floats:
-    a, b, c = (vertices.take(triangles[:, k], axis=0) for k in range(3))
-    return cross(np.subtract(b, a, order="F"), np.subtract(c, a, order="F"))
-
-
-def _is_flat(positions: Floats, triangles: Ints, frame: Frame) -> NDArray[np.bool_]:
-    """Zero area, up to the rounding that the positions carry from their place in the world."""
-    a, b, c = (positions.take(triangles[:, k], axis=0) for k in range(3))
-    b -= a
-    c -= a
-    normal = cross(b, c)
-    longest = np.maximum(dot(b, b), dot(c, c))  # of the two edges, squared: within a factor of the longest
+def _areas(positions: Floats, triangles: Ints, frame: Frame) -> tuple[Floats, NDArray[np.bool_]]:
+    """Of triangles, and whether they are zero, up to the rounding that the positions carry from their place."""
+    ab, ac = _edges(positions, triangles)
+    normal = cross(ab, ac)
+    longest = np.maximum(dot(ab, ab), dot(ac, ac))  # of the two edges, squared: within a factor of the longest
     rounding = FLAT_ROUNDINGS * np.finfo(np.float64).eps * float(np.abs(positions).max() + frame.offset)
-    return dot(normal, normal) <= rounding * rounding * longest
+    return lengths(normal) / 2, dot(normal, normal) <= rounding * rounding * longest
+
+
+def _edges(vertices: Floats, triangles: Ints) -> tuple[Floats, Floats]:
+    """From the first corner of each triangle to the two others."""
+    a, b, c = (vertices.take(triangles[:, k], axis=0) for k in range(3))
+    return np.subtract(b, a, order="F"), np.subtract(c, a, order="F")
 
 
 def _is_first(triangles: Ints) -> NDArray[np.bool_]:

@@ -50,8 +50,9 @@ def check_beside(path: str) -> None:
         Path(each).read_bytes() for each in libraries if each.name == own or os.fsencode(each.name) in text
     )
     for each, why in bad:
-        names = "|".join(re.escape(name) for name in (each.name, quote(each.name)))
-        if each.name == own or re.search(rb"(?<![\w.-])(?:%b)(?![\w.-])" % os.fsencode(names), text):
+        names = [name for name in map(os.fsencode, (each.name, quote(each.name))) if name in text]
+        words = rb"(?<![\w.-])(?:%b)(?![\w.-])" % b"|".join(map(re.escape, names))
+        if each.name == own or (names and re.search(words, text)):
             raise FileError(f"{path}: it names {each.path}; {why}")
 
 
