@@ -94,7 +94,7 @@ def chain(names: Sequence[str], switches: Sequence[Switch | None]) -> tuple[Leve
         elif switch.bound == "below":
             levels.append(Level(number, name, None, f"it differs too much even at {switch.pixels:.0f} px"))
         elif switch.pixels <= largest:
-            levels.append(Level(number, name, None, f"{coarser}, which is coarser, may be shown as early"))
+            levels.append(Level(number, name, None, f"{coarser}, which comes after it, may be shown as early"))
         else:
             largest, coarser = switch.pixels, name
             levels.append(Level(number, name, switch.pixels))

@@ -83,7 +83,7 @@ def test_a_chain_only_gets_smaller_and_says_what_has_no_place() -> None:
     levels = chain(names, [Switch(90, "", 0), Switch(100, "", 0), None, Switch(40, "", 0), Switch(16, "below", 0)])
     assert [level.pixels for level in levels] == [None, 100, None, 40, None]
     assert [level.why for level in levels] == [
-        "b, which is coarser, may be shown as early", "", "it could not be measured", "",
+        "b, which comes after it, may be shown as early", "", "it could not be measured", "",
         "it differs too much even at 16 px",
     ]  # fmt: skip
 
