@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..metric.geometry import Floats, cross, dot
-from ..metric.surface import Surface, triangle_normals
+from ..metric.geometry import Floats, cross, dot, triangle_normals
+from ..metric.surface import Surface
 from .placement import nearest_on
 
 STEPS = 60

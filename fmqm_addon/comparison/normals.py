@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..metric.geometry import Floats, Ints, cross, dot
-from ..metric.surface import Surface, triangle_normals
+from ..metric.geometry import Floats, Ints, cross, dot, triangle_normals
+from ..metric.surface import Surface
 
 SMOOTH_ANGLE = 60.0  # degrees; where a mesh has no normals, they are smoothed over edges that are less sharp
 

@@ -44,6 +44,23 @@ def lengths(rows: Floats) -> Floats:
     return np.sqrt(squared, out=squared)
 
 
+def triangle_edges(vertices: Floats, triangles: Ints) -> tuple[Floats, Floats]:
+    """(T, 3) vectors from the first corner of each triangle to the two others; each axis in one piece of memory."""
+    a, b, c = (vertices.take(triangles[:, k], axis=0) for k in range(3))
+    return np.subtract(b, a, order="F"), np.subtract(c, a, order="F")
+
+
+def triangle_areas(vertices: Floats, triangles: Ints) -> Floats:
+    """(T,) areas."""
+    return lengths(cross(*triangle_edges(vertices, triangles))) / 2
+
+
+def triangle_normals(vertices: Floats, triangles: Ints) -> Floats:
+    """(T, 3) unit normals; the triangles must not be degenerate."""
+    normals = cross(*triangle_edges(vertices, triangles))
+    return np.asarray((normals.T / lengths(normals)).T)
+
+
 def weighted(weights: Floats, a: Floats, b: Floats, c: Floats) -> Floats:
     """(N, K) sums of the rows of (N, K) a, b and c, with (N, 3) weights; each column in one piece of memory."""
     of_a, of_b, of_c = weights.T

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .geometry import Floats, Ints, dot, morton_order, ranges
+from .geometry import Floats, Ints, dot, morton_order, ranges, triangle_areas
 from .settings import Settings
 from .stepper import Progress, Work
-from .surface import Surface, triangle_areas
+from .surface import Surface
 
 FPS_TIE = 1e-5  # V-B: distances this close, relatively, are equal; the lowest vertex index wins
 SPLIT_BELOW = 4  # V-B: once split, no triangle is above S_global / (SPLIT_BELOW n_patches)

@@ -10,9 +10,9 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from .geometry import Floats, Ints, closest_on_triangles, cross, dot, lengths
+from .geometry import Floats, Ints, closest_on_triangles, cross, dot, lengths, triangle_normals
 from .stepper import Progress, Work, as_part, finish
-from .surface import Surface, SurfaceQuery, triangle_normals
+from .surface import Surface, SurfaceQuery
 
 # A ray goes on this far behind a hit, some float32 steps, so as not to find the same place again.
 RAY_STEP = 1e-6

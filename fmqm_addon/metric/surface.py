@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import MeshError
-from .geometry import Floats, Ints, cross, dot, lengths, weighted
-from .stepper import Progress, Work, finish
+from .geometry import Floats, Ints, cross, dot, lengths, triangle_edges, weighted
+from .stepper import Progress, Work, as_part, finish
 from .texture import Material
 
 # Heights of triangles below this many float64 roundings of the position count as zero area.
 FLAT_ROUNDINGS = 8
+_BATCH = 1 << 16  # triangles of a step
 
 
 @dataclass(frozen=True)
@@ -262,7 +263,7 @@ def preparing_surface(mesh: MeshArrays, build_query: QueryBuilder, frame: Frame 
     positions, triangles = weld(frame.enter(world), triangles)
     welded = len(world) - len(positions)
     yield Progress("", 0.4)
-    areas, is_flat = _areas(positions, triangles, frame)
+    areas, is_flat = yield from as_part(_areas(positions, triangles, frame), 0.4, 0.1)
     flat = keep(~is_flat, "have zero area", notes)
     yield Progress("", 0.5)
     repeated = keep(_is_first(triangles), "repeat another triangle", notes)
@@ -346,29 +347,20 @@ def is_closed(triangles: Ints) -> bool:
     return bool(together == 0)
 
 
-def triangle_areas(vertices: Floats, triangles: Ints) -> Floats:
-    return lengths(cross(*_edges(vertices, triangles))) / 2
-
-
-def triangle_normals(vertices: Floats, triangles: Ints) -> Floats:
-    """(T, 3) unit normals; the triangles must not be degenerate."""
-    normals = cross(*_edges(vertices, triangles))
-    return np.asarray((normals.T / lengths(normals)).T)
-
-
-def _areas(positions: Floats, triangles: Ints, frame: Frame) -> tuple[Floats, NDArray[np.bool_]]:
-    """Of triangles, and whether they are zero, up to the rounding that the positions carry from their place."""
-    ab, ac = _edges(positions, triangles)
-    normal = cross(ab, ac)
-    longest = np.maximum(dot(ab, ab), dot(ac, ac))  # of the two edges, squared: within a factor of the longest
+def _areas(positions: Floats, triangles: Ints, frame: Frame) -> Work[tuple[Floats, NDArray[np.bool_]]]:
+    """Of triangles, and whether they are zero, up to the rounding that the positions carry from their place in the
+    world; yields the share done."""
+    areas, is_flat = np.empty(len(triangles)), np.empty(len(triangles), bool)
     rounding = FLAT_ROUNDINGS * np.finfo(np.float64).eps * float(np.abs(positions).max() + frame.offset)
-    return lengths(normal) / 2, dot(normal, normal) <= rounding * rounding * longest
-
-
-def _edges(vertices: Floats, triangles: Ints) -> tuple[Floats, Floats]:
-    """From the first corner of each triangle to the two others."""
-    a, b, c = (vertices.take(triangles[:, k], axis=0) for k in range(3))
-    return np.subtract(b, a, order="F"), np.subtract(c, a, order="F")
+    for first in range(0, len(triangles), _BATCH):
+        here = slice(first, first + _BATCH)
+        ab, ac = triangle_edges(positions, triangles[here])
+        normal = cross(ab, ac)
+        longest = np.maximum(dot(ab, ab), dot(ac, ac))  # of the two edges, squared: within a factor of the longest
+        areas[here] = lengths(normal) / 2
+        is_flat[here] = dot(normal, normal) <= rounding * rounding * longest
+        yield Progress("", min(1.0, (first + _BATCH) / len(triangles)))
+    return areas, is_flat
 
 
 def _is_first(triangles: Ints) -> NDArray[np.bool_]:

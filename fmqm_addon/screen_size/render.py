@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..metric.colorspace import decode_srgb
-from ..metric.geometry import Floats, Ints, dot, weighted
-from ..metric.surface import Surface, triangle_normals
+from ..metric.geometry import Floats, Ints, dot, triangle_normals, weighted
+from ..metric.surface import Surface
 from .definition import AMBIENT, BACKGROUND, HEADLIGHT, MARGIN, OPAQUE
 from .rasterize import CutOut, rasterize
 

@@ -17,10 +17,10 @@ from fmqm_addon.comparison.doubts import ADDED, FLIPPED
 from fmqm_addon.comparison.surface_facts import edge_counts, overlapping_share, surface_facts
 from fmqm_addon.comparison.trust import Trust, assessing, covered_share, differing_maps
 from fmqm_addon.metric.evaluation import Evaluation, Result
-from fmqm_addon.metric.geometry import Floats, Ints
+from fmqm_addon.metric.geometry import Floats, Ints, triangle_areas
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.stepper import finish
-from fmqm_addon.metric.surface import MeshArrays, Surface, join_meshes, prepare_surface, triangle_areas
+from fmqm_addon.metric.surface import MeshArrays, Surface, join_meshes, prepare_surface
 from fmqm_addon.metric.texture import ImageFacts, Material, PlainColor
 from fmqm_addon.report.trust_table import trust_dict, trust_lines, trust_text
 from tests.metric.meshes import SMALL, TRIANGLE, cube, grid, mesh_arrays, moved, shaken, sphere, surface, texture

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from fmqm_addon.metric import queries, settling
 from fmqm_addon.metric.fields import Fields, evaluate_fields
-from fmqm_addon.metric.geometry import Floats, Ints, morton_order
+from fmqm_addon.metric.geometry import Floats, Ints, morton_order, triangle_normals
 from fmqm_addon.metric.queries import _coarse_to_fine, _guide, count_crossings, count_crossings_of_all, normals_at
 from fmqm_addon.metric.stepper import Work
-from fmqm_addon.metric.surface import MeshArrays, Surface, prepare_surface, triangle_normals
+from fmqm_addon.metric.surface import MeshArrays, Surface, prepare_surface
 from fmqm_addon.metric.texture import PlainColor
 
 from .meshes import TETRAHEDRON, cube, grid, icosahedron, materials, sphere, surface, texture

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fmqm_addon.metric.geometry import Floats, Ints
+from fmqm_addon.metric.geometry import Floats, Ints, triangle_areas, triangle_normals
 from fmqm_addon.metric.patches import (
     PatchMesh,
     build_patch_mesh,
@@ -21,7 +21,6 @@ from fmqm_addon.metric.patches import (
 )
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.stepper import finish
-from fmqm_addon.metric.surface import triangle_areas, triangle_normals
 
 from .meshes import TETRAHEDRON, TRIANGLE, cube, grid, icosahedron, sphere, surface
 from .oracles import farthest_points_by_loop, grow_with_sets

@@ -11,12 +11,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fmqm_addon.metric.geometry import Ints
+from fmqm_addon.metric.geometry import Ints, triangle_normals
 from fmqm_addon.metric.patches import Patch, PatchMesh, build_patch_mesh, choose_centers, grow_patches
 from fmqm_addon.metric.sampling import PatchSamples, draw_samples, join_samples, sample_count
 from fmqm_addon.metric.settings import Settings
 from fmqm_addon.metric.stepper import finish
-from fmqm_addon.metric.surface import triangle_normals
 
 from .meshes import SMALL, TETRAHEDRON, cube, grid, sphere, surface
 

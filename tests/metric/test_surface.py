@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from fmqm_addon.metric import surface as surface_module
 from fmqm_addon.metric.errors import FMQMError, MeshError
-from fmqm_addon.metric.geometry import Floats, Ints
-from fmqm_addon.metric.surface import MeshArrays, prepare_surface, triangle_areas, triangle_normals, weld
+from fmqm_addon.metric.geometry import Floats, Ints, triangle_areas, triangle_normals
+from fmqm_addon.metric.surface import MeshArrays, prepare_surface, weld
 from fmqm_addon.metric.texture import PlainColor, Texture
 
 from .meshes import TETRAHEDRON, TRIANGLE, cube, materials, mesh_arrays, moved, surface

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fmqm_addon.metric.surface import triangle_areas
+from fmqm_addon.metric.geometry import triangle_areas
 from fmqm_addon.report.visual.heat_map import fitted_range, histogram, round_ticks, split_large
 
 

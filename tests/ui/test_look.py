@@ -22,10 +22,9 @@ from fmqm_addon.comparison.measurement import Comparison, Measurement
 from fmqm_addon.metric.colorspace import decode_srgb, srgb_to_lab
 from fmqm_addon.metric.evaluation import Result, Scores
 from fmqm_addon.metric.fields import Fields
-from fmqm_addon.metric.geometry import dot
+from fmqm_addon.metric.geometry import dot, triangle_areas, triangle_normals
 from fmqm_addon.metric.sampling import Samples
 from fmqm_addon.metric.settings import Settings
-from fmqm_addon.metric.surface import triangle_areas, triangle_normals
 from fmqm_addon.report.visual import colormap, layers
 from fmqm_addon.report.visual.heat_map import UNCOVERED
 from fmqm_addon.report.visual.shells import SHELLS, fields_at, shell_points, slice_points

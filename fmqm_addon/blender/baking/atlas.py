@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...metric.errors import MeshError
-from ...metric.geometry import Floats, Ints, dot
-from ...metric.surface import triangle_areas
+from ...metric.geometry import Floats, Ints, dot, triangle_areas
 
 LARGEST = 8192  # pixels a side
 _ROOMY, _TIGHT = 4, 2  # smallest sides of cells: one that still shows gradients, one that is left if there is no room

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from ...metric.colorspace import encode_srgb
 from ...metric.errors import MeshError
-from ...metric.geometry import Floats
-from ...metric.surface import triangle_areas
+from ...metric.geometry import Floats, triangle_areas
 from ...metric.texture import Material, Texture
 from .. import arrays
 from ..materials.expressions import ImageAlpha, Opacity

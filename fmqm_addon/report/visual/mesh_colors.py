@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...comparison.normals import corner_normals
-from ...metric.geometry import Floats, Ints
+from ...metric.geometry import Floats, Ints, triangle_areas
 from ...metric.stepper import Progress, Work
-from ...metric.surface import Surface, triangle_areas
+from ...metric.surface import Surface
 
 MOST_CELLS = 255  # along an edge
 _BATCH = 1 << 15  # colors of a step

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...metric.fields import Fields, evaluate_fields
-from ...metric.geometry import Floats, Ints, morton_order
+from ...metric.geometry import Floats, Ints, morton_order, triangle_normals
 from ...metric.sampling import draw_barycentric, triangles_evenly
 from ...metric.stepper import finish
-from ...metric.surface import Surface, triangle_normals
+from ...metric.surface import Surface
 
 SHELLS = 5  # as in the supplement's figure
 

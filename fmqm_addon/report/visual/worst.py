@@ -9,9 +9,8 @@ import numpy as np
 
 from ...comparison.judge import Judge
 from ...metric.evaluation import Result
-from ...metric.geometry import Floats
+from ...metric.geometry import Floats, triangle_areas, triangle_normals
 from ...metric.perceived import PERCEIVED_COLUMNS
-from ...metric.surface import triangle_areas, triangle_normals
 
 
 @dataclass(frozen=True)
