@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lets every test import the checkout, installed or not, and keeps Blender away from the user's own settings."""
+"""Lets every test import the checkout, installed or not, and keeps Blender away from the user's own settings.
+
+Hypothesis takes the same examples on every run, however long one takes: here, before any test is defined, since
+@settings completes itself by the profile of that moment.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +14,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
@@ -17,6 +22,15 @@ sys.path.insert(0, str(ROOT))
 # Read by Blender when bpy is imported, here and in the processes that tests start.
 os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix="fmqm-tests-")
 
+settings.register_profile(
+    "fmqm",
+    derandomize=True,
+    database=None,
+    deadline=None,
+    max_examples=40,
+    suppress_health_check=[HealthCheck.too_slow],
+)
+settings.load_profile("fmqm")
 
 _EXIT_STATUS = pytest.StashKey[int]()
 

@@ -50,7 +50,7 @@ def test_values_are_scipys() -> None:
 
 
 @given(st.integers(0, 1000))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_a_resample_counts_rows_as_if_they_stood_there_again(seed: int) -> None:
     weights = draws(len(X), 3, seed)
     fitted = X * 2 + 1

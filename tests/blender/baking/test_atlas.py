@@ -63,7 +63,7 @@ def drawn(made: Layout, colors: np.ndarray) -> np.ndarray:
     return pixels
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(faces(), st.sampled_from([1, 8, 16, 60, 128]))
 def test_no_lookup_reads_another_face(made: tuple[np.ndarray, ...], size: int) -> None:
     vertices, triangles, place, quad = made
@@ -166,7 +166,7 @@ def test_own_map_that_does_not(uv: np.ndarray, areas: np.ndarray) -> None:
     assert own_layout(uv, areas, 128) is None
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 6))
 def test_covered_pixels_are_counted(seed: int, count: int) -> None:
     """Random triangles have no pixel center on an edge: the naive count is exact."""

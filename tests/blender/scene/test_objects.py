@@ -241,7 +241,7 @@ TRANSFORMS = st.builds(
 )
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.lists(TRANSFORMS, min_size=4, max_size=4))
 def test_transforms_of_parents_and_instances_compose(matrices: list[Matrix]) -> None:
     """Mirrors and shears included: a square under a parent, in a collection, instanced by the child of an empty."""

@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from mathutils import Matrix
 
@@ -95,7 +95,7 @@ def add_object(drawn: dict[str, object], image: Path) -> bpy.types.Object:
     return made
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=60)
 @given(first=objects(), second=objects(), space=st.sampled_from(SPACES), match_scale=st.booleans())
 def test_anything_is_measured_or_refused(
     image: Path, first: dict[str, object], second: dict[str, object], space: str, match_scale: bool
