@@ -15,12 +15,13 @@ import time
 from pathlib import Path
 from typing import Any
 
-TIMEOUT = 60  # seconds for any one answer
+TIMEOUT = 300  # seconds for any one answer: machines are busy
 FLAGS = (
     "--headless=new", "--remote-debugging-pipe", "--no-sandbox", "--disable-dev-shm-usage",
     "--no-first-run", "--disable-extensions", "--disable-background-networking",
 )  # fmt: skip
 NO_GPU = ("--disable-gpu",)
+FRAMES = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done))))"
 
 
 class Page:
@@ -82,7 +83,7 @@ class Page:
         self._profile.cleanup()
 
     def open(self, path: Path, width: int, height: int = 900, dark: bool = False) -> None:
-        """A file, by its path; returns when it has loaded."""
+        """A file, by its path; returns when it is drawn: before its first frame no observer is told, no mouse heard."""
         self._call(
             "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width < 600
         )
@@ -93,6 +94,11 @@ class Page:
         assert "errorText" not in answer, f"{path}: {answer['errorText']}"
         while "Page.loadEventFired" not in self._events:
             self._read()
+        self.draw()
+
+    def draw(self) -> None:
+        """Until what was done so far is on the screen, and what watches sizes and scrolling has been told."""
+        self.run(FRAMES)
 
     def run(self, script: str) -> Any:
         """The value of an expression, awaited if it is a promise."""
@@ -103,8 +109,7 @@ class Page:
     def seconds(self, script: str) -> float:
         """Processor time of the page's main thread until what an expression does is on the screen."""
         before = self._task_seconds()
-        frames = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done))))"
-        self.run(f"(async () => {{ {script}; await {frames} }})()")
+        self.run(f"(async () => {{ {script}; await {FRAMES} }})()")
         return self._task_seconds() - before
 
     def _task_seconds(self) -> float:

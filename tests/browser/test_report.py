@@ -23,7 +23,8 @@ STRANGE = "<img src=x onerror=alert(1)>&'<-script>.obj"
 OPEN_IMAGES = "[...document.images].filter((image) => image.offsetParent)"
 ALL_PICTURES = f"Promise.all({OPEN_IMAGES}.map((i) => {{ i.loading = 'eager'; return i.decode(); }}))"
 MANY, LEVELS = 1000, 4  # pairs of a large report; of each of its references
-CLICK = 0.1  # seconds of processor time that an answer takes at most
+STAND = 200  # of many pairs, fewer than these stand in the page
+CLICK = 4  # times what laying the table out anew takes, at most: about a tenth of a second
 
 
 @pytest.fixture(scope="module")
@@ -207,22 +208,28 @@ def test_filters_and_search(page: Page, report: Path) -> None:
     assert tiles(page) == [] and page.run("document.querySelector('.nothing').offsetHeight") > 0
     page.click("[data-filter=all]")
     assert tiles(page) == table(page) == ["shaken.obj"]
-    page.run("location.hash = '#pair-2'; new Promise((done) => setTimeout(done, 50))")
+    page.run("location.hash = '#pair-2'; new Promise((done) => addEventListener('hashchange', done, { once: true }))")
     assert open_pair(page) == "cut.glb" and len(tiles(page)) == 3  # a link shows what a filter hides
     assert page.messages == []
 
 
 def test_a_thousand_pairs_stay_fluid(page: Page, many: Path) -> None:
-    """Each click in less than a tenth of a second of the page's processor time; the best of two, on a busy machine."""
+    """A click costs the page's thread no more than some layouts of the few that stand in it: the best of two."""
     page.open(many, width=1280)
     assert page.run("document.querySelector('h1').textContent") == f"1,000 LODs of {MANY // LEVELS} originals"
-    assert 60 <= len(tiles(page)) < 200
+    assert 60 <= len(tiles(page)) < STAND
+    anew = "const table = document.querySelector('.scores'), all = table.parentNode; table.remove(); all.append(table)"
     clicks = [f"document.querySelector('{selector}').click()" for selector in (
         "[data-filter=failed]", "[data-filter=all]", ".turn", "[data-show=table]", ".scores th:nth-child(3) button",
         "[data-show=heat]", "[data-show=lod]", ".level:nth-child(2) .tile", ".level:nth-child(1) .tile",
     )]  # fmt: skip
-    seconds = {click: min(page.seconds(click) for _ in range(2)) for click in clicks}
-    assert max(seconds.values()) < CLICK, seconds
+    clicks.insert(5, anew)  # where the table is shown
+    seconds = {}
+    for click in clicks:
+        seconds[click] = min(page.seconds(click) for _ in range(2))
+        assert len(tiles(page)) < STAND and len(table(page)) < STAND, click
+    layout = seconds.pop(anew)
+    assert max(seconds.values()) < CLICK * layout, (seconds, layout)
     search(page, "PROP_0042")
     assert tiles(page) == ["prop_0042_lod.glb"]
     search(page, "")
@@ -231,7 +238,7 @@ def test_a_thousand_pairs_stay_fluid(page: Page, many: Path) -> None:
         page.run("scrollTo(0, 1e9)")
         if len(tiles(page)) > 100:
             break
-        page.run("new Promise((done) => setTimeout(done, 100))")
+        page.draw()
     else:
         pytest.fail("no more come")
     assert page.messages == []
@@ -287,7 +294,8 @@ def test_nothing_hides_behind_the_toolbar(page: Page, many: Path) -> None:
         page.click(".level:nth-child(2) .tile")
         assert page.run(top.format(".pair h3")) >= page.run(bottom) > 0
     page.click("[data-show=table]")
-    page.run("scrollTo(0, 1500); new Promise((done) => setTimeout(done, 50))")
+    page.run("scrollTo(0, 1500)")
+    page.draw()
     assert abs(page.run(top.format(".scores th")) - page.run(bottom)) < 2
 
 

@@ -26,10 +26,9 @@ SOFTWARE_GL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 NO_GL = ("--disable-3d-apis",)
 GREEN, BLUE = (40, 160, 90), (60, 90, 200)  # the original's color and the LOD's
 BACKGROUND = (236, 237, 239)
-REST = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
 OPEN = """(async () => {
   document.querySelectorAll(".viewer-open")[0].click();
-  for (let k = 0; k < 300 && !document.querySelector(".viewer-shown"); k++) {
+  while (!document.querySelector(".viewer-shown")) {
     await new Promise((done) => setTimeout(done, 50));
     if (/cannot/.test(document.querySelector(".viewer-said").textContent)) break;
   }
@@ -84,7 +83,7 @@ def choose(page: Page, label: str, value: object) -> None:
 
 def pixels(page: Page, selector: str = ".viewer-stage") -> np.ndarray:
     """(H, W, 3) int of an element, once it is drawn."""
-    page.run(REST)
+    page.draw()
     return np.asarray(Image.open(io.BytesIO(page.picture_of(selector))).convert("RGB")).astype(int)
 
 
@@ -260,7 +259,7 @@ def test_a_phone_has_the_wipe_first_and_all_in_its_width(page: Page, report: Pat
     )
     for layout in ("Wipe", "Side by Side"):
         choose(page, "View", layout)
-        page.run(REST)
+        page.draw()
         assert page.run("document.documentElement.scrollWidth") == 375 and page.run(outside) == 0
     colors = "getComputedStyle(document.querySelector('.viewer-stage')).backgroundColor"
     assert (sum(map(int, re.findall(r"\d+", page.run(colors))[:3])) < 300) == dark
