@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A worker that scores nothing but does what the names of its pairs say: die, realtime, die once, quit, nap, hang."""
+"""A worker that scores nothing but does what the names of its pairs say: die, realtime, die once, quit, wait, hang."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ end_with_parent()
 if sys.argv[1] == "refuse":
     sys.exit("no Blender here")
 Path(sys.argv[1]).joinpath(f"{os.getpid()}.pid").touch()
-if Path(sys.argv[1], "slow").exists():
-    time.sleep(3)
+while Path(sys.argv[1], "slow").exists():
+    time.sleep(0.02)
 journal = Journal(journal_of(str(shard)), made_by={"fmqm_code": "other"} if Path(sys.argv[1], "other").exists() else {})
 for task in (task_of(plain) for plain in json.loads(shard.read_text(encoding="utf-8"))):
     journal.start(task.key)
@@ -37,13 +37,13 @@ for task in (task_of(plain) for plain in json.loads(shard.read_text(encoding="ut
         os.kill(os.getpid(), 40)  # a signal without a name
     if name == "quit":
         sys.exit("no memory here")
-    if name == "nap":
-        time.sleep(1)
+    while name == "wait" and not Path(sys.argv[1], "go").exists():
+        time.sleep(0.02)
     if name == "hang":
-        time.sleep(60)
+        time.sleep(3600)
     if name == "swell":
         swollen = bytearray(300_000_000)
         swollen[::4096] = b"x" * len(swollen[::4096])
-        time.sleep(60)
+        time.sleep(3600)
     scores = numbers(0.5) | {"id": task.row.id, "pid": os.getpid()}
     journal.done(task.key, pair_record(PairScore("reference", name, patches=200)) | scores)
