@@ -58,7 +58,7 @@ def errors(path: Path) -> list[str | None]:
 def test_a_double_dash_does_not_hide_what_a_worker_is(assets: Path, tmp_path: Path) -> None:
     """Each worker would be a parent of workers, and so on."""
     command = ["--jobs", "2", *TINY, "--json", tmp_path / "j", "--quiet", "ref.obj", "--", "-b.obj", "ref.obj"]
-    assert score(*command, cwd=assets, timeout=120).returncode == 1
+    assert score(*command, cwd=assets, timeout=600).returncode == 1
     assert errors(tmp_path / "j") == ["-b.obj: no such file", None]
 
 
@@ -94,23 +94,29 @@ def test_a_single_pair_that_ended_this_process_is_resumed_in_a_worker(assets: Pa
 
 
 @pytest.mark.parametrize(
-    ("name", "times", "code", "within"),
-    [("busy.obj", 1, 130, 15), ("busy.obj", 2, 130, 15), ("deaf.obj", 1, -signal.SIGKILL, 20)],
+    ("name", "times", "code"), [("busy.obj", 1, 130), ("busy.obj", 2, 130), ("deaf.obj", 1, -signal.SIGKILL)]
 )
 def test_a_stop_ends_what_does_not_come_back_from_c(
-    assets: Path, tmp_path: Path, name: str, times: int, code: int, within: float
+    assets: Path, tmp_path: Path, name: str, times: int, code: int
 ) -> None:
     command = [sys.executable, str(SCORE), "ref.obj", name, *TINY, "--quiet"]
     env = os.environ | hooked(assets, tmp_path / "tmp")
     process = subprocess.Popen(command, cwd=assets, env=env, stderr=subprocess.PIPE, text=True)
     assert process.stderr is not None
     assert "it has come to" in process.stderr.readline()
+    while sys.platform == "linux" and not sleeps(process.pid):  # in C
+        time.sleep(0.02)
     for _ in range(times):
         time.sleep(0.1)
         process.send_signal(signal.SIGINT)
-    _, told = process.communicate(timeout=within)
+    _, told = process.communicate(timeout=120)
     assert process.returncode == code and "Traceback" not in told
     assert code == -signal.SIGKILL or not os.listdir(tmp_path / "tmp")
+
+
+def sleeps(pid: int) -> bool:
+    """Whether its main thread waits for something."""
+    return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "S"
 
 
 def shell(text: str, *arguments: object, **more: Any) -> subprocess.CompletedProcess[str]:

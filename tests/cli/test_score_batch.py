@@ -95,7 +95,7 @@ def test_200_pairs_five_hostile_killed_twice_and_resumed(assets: Path, tmp_path:
     for part in (60, 130):
         arguments = map(str, [*command, *outputs("killed"), "--jobs", "2", "--resume"])
         parent = subprocess.Popen([sys.executable, str(SCORE), *arguments], stderr=subprocess.DEVNULL)
-        end = time.monotonic() + 60
+        end = time.monotonic() + 600
         while not journal.exists() or journal.read_bytes().count(b'{"done"') < part:
             assert parent.poll() is None and time.monotonic() < end
             time.sleep(0.02)
@@ -266,7 +266,7 @@ def test_interrupted_run_says_how_to_go_on(assets: Path, tmp_path: Path) -> None
             assert process.poll() is None
             time.sleep(0.02)
         process.send_signal(how)
-        _, told = process.communicate(timeout=20)
+        _, told = process.communicate(timeout=120)
         assert process.returncode == 130 and "--resume" in told and "Traceback" not in told
         before = len(scored(journal))
         assert 0 < before < len(SHAKEN) and not (tmp_path / "c").exists()

@@ -781,7 +781,7 @@ def test_python_ends_after_the_add_on(handlers: bool) -> None:
         lines.append("from fmqm_addon.ui.stale import _HANDLERS")
         lines.append("for name, handler in _HANDLERS: getattr(bpy.app.handlers, name).append(handler)")
     lines.append("fmqm_addon.unregister()")
-    done = subprocess.run([sys.executable, "-c", "\n".join(lines)], cwd=ROOT, timeout=60, check=False)
+    done = subprocess.run([sys.executable, "-c", "\n".join(lines)], cwd=ROOT, timeout=300, check=False)
     assert done.returncode == 0
 
 
