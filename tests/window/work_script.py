@@ -69,6 +69,7 @@ def work() -> Iterator[Callable[[], object]]:
     )
     build()
     live, session = module("ui.live"), module("ui.session")
+    live.MOST = 100.0  # that it stops where a pair takes long is not shown here, however slow the machine is
     yield lambda: not bpy.data.is_dirty
     bpy.ops.fmqm.live()
     yield up_to_date
@@ -77,10 +78,13 @@ def work() -> Iterator[Callable[[], object]]:
     reading, worked = live.current.reading, []
     for step in range(10):  # a drag
         ratio().ratio = 0.5 - 0.03 * step
-        until = time.monotonic() + 0.1
-        yield lambda until=until: time.monotonic() > until
-        worked.append(live.current.reading is not reading)
-    REPORT["worked while dragged"] = any(worked)
+        bpy.context.view_layer.update()
+        touched = time.monotonic()
+        yield lambda until=touched + 0.1: time.monotonic() > until
+        if live.current.reading is not reading and time.monotonic() - touched < live.REST:
+            worked.append(step)  # a busy window may be slower, and what rests is measured
+        reading = live.current.reading
+    REPORT["worked while dragged"] = bool(worked)
     yield up_to_date
     bpy.ops.ed.undo_push(message="Ratio")
     ratio().ratio = 0.1
@@ -119,7 +123,7 @@ def work() -> Iterator[Callable[[], object]]:
     bpy.ops.ed.undo_push(message="Chain")
     before = blocks()
     bpy.ops.fmqm.lod_chain("INVOKE_DEFAULT")
-    yield lambda: session.job.progress > 0.3
+    yield lambda: session.job.progress > 0.05
     bpy.ops.fmqm.cancel()
     yield lambda: session.job is None
     REPORT["left of a cancelled chain"] = sorted(set(blocks()) ^ set(before))
