@@ -38,6 +38,15 @@ from tests.blender.script import (
 
 TINY = ("--samples", "640", "--patches", "20", "--color-units", "5")
 SHAKEN = [f"shaken{number}.obj" for number in range(20)]
+# A run comes to this file and waits there until it is stopped, however long that takes.
+HOLD = """
+import os, sys, time
+def hook(event, arguments):
+    if event == "open" and os.path.basename(str(arguments[0])) == os.environ["HOLD_AT"]:
+        while not sys.modules["fmqm_addon.batch.interrupt"].interrupted():
+            time.sleep(0.02)
+sys.addaudithook(hook)
+"""
 HOSTILE = ["cut.glb", "nowhere.obj", "flat.obj", "a.png", "broken.obj"]
 
 
@@ -259,9 +268,13 @@ def test_interrupted_run_says_how_to_go_on(assets: Path, tmp_path: Path) -> None
     """SIGTERM as Ctrl-C; plain pairs too, whose journal is gone once they are all done."""
     command = [sys.executable, str(SCORE), "ref.obj", *SHAKEN, *TINY, "--csv", str(tmp_path / "c"), "--quiet"]
     journal = tmp_path / "c.journal.jsonl"
-    for how in (signal.SIGINT, signal.SIGTERM):
+    python = tmp_path / "python"
+    python.mkdir()
+    (python / "sitecustomize.py").write_text(HOLD)
+    for how, last in ((signal.SIGINT, SHAKEN[10]), (signal.SIGTERM, SHAKEN[-1])):
         known = len(scored(journal)) if journal.exists() else 0
-        process = subprocess.Popen(command, cwd=assets, stderr=subprocess.PIPE, text=True)
+        env = os.environ | {"PYTHONPATH": str(python), "HOLD_AT": last}
+        process = subprocess.Popen(command, cwd=assets, env=env, stderr=subprocess.PIPE, text=True)
         while not journal.exists() or journal.read_bytes().count(b'{"done"') <= known:
             assert process.poll() is None
             time.sleep(0.02)
@@ -274,7 +287,7 @@ def test_interrupted_run_says_how_to_go_on(assets: Path, tmp_path: Path) -> None
     done = score(*command[2:], cwd=assets)
     assert done.returncode == 0 and sorted(scored(journal)) == sorted(SHAKEN)
     assert score("ref.obj", SHAKEN[0], *TINY, "--csv", tmp_path / "d", cwd=assets).returncode == 0
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["c", "c.journal.jsonl", "d"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["c", "c.journal.jsonl", "d", "python"]
 
 
 def test_junit(assets: Path, tmp_path: Path) -> None:
