@@ -22,15 +22,19 @@ from typing import IO
 
 if sys.platform == "win32":
     import msvcrt
+
+    _Held = PermissionError  # what says that another has a lock
 else:
     import fcntl
+
+    _Held = BlockingIOError
 
 TEMPORARY_PLACES = ("TMPDIR", "TEMP", "TMP")  # of them Python and Blender take one
 TEMPORARY = "tmp"  # the kind that anybody may remove once its owner has gone
 _PREFIX = ".fmqm-"
 _LOCK = "owner.lock"
 _TEXT = b"A temporary folder of FMQM. Without a running FMQM it may be removed.\n"
-_PATIENCE = 0.5  # seconds until a lock of one's own is given up; one who sweeps holds it for a moment
+_PATIENCE = 30.0  # seconds until a lock of one's own is given up; who sweeps holds it for a moment, or stands still
 
 
 @dataclass
@@ -104,7 +108,7 @@ def sweep(parent: str | Path, kind: str, adopt: Callable[[Path], None] | None = 
         found = [Path(entry.path) for entry in entries if name.fullmatch(entry.name) and _is_own(entry)]
     for path in sorted(found):
         with contextlib.suppress(OSError), open(path / _LOCK, "rb+") as lock:
-            if not _locked(lock) or lock.read(len(_TEXT) + 1) != _TEXT:
+            if not _lock(lock) or lock.read(len(_TEXT) + 1) != _TEXT:
                 continue
             if adopt is not None:
                 adopt(path)
@@ -123,8 +127,9 @@ def _make(parent: str | Path | None, kind: str) -> _Owned:
         os.rmdir(path)
         raise
     end = time.monotonic() + _PATIENCE
-    while not _locked(lock) and time.monotonic() < end:
-        time.sleep(0.01)
+    with contextlib.suppress(OSError):
+        while not _lock(lock) and time.monotonic() < end:
+            time.sleep(0.01)
     # Only now, so that nobody takes it for left; where a system has no locks, nobody gets one to remove it either.
     owned = _Owned(path, lock)
     try:
@@ -144,13 +149,17 @@ def _is_own(entry: os.DirEntry[str]) -> bool:
     return False
 
 
-def _locked(file: IO[bytes]) -> bool:
-    """Takes a file's lock, which goes with the process; whether it was free."""
+def _lock(file: IO[bytes]) -> bool:
+    """Takes a file's lock, which goes with the process; whether it was free.
+
+    Raises:
+        OSError: there are no locks here.
+    """
     try:
         if sys.platform == "win32":
             msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
         else:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
+    except _Held:
         return False
     return True

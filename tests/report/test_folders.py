@@ -7,10 +7,13 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 from pathlib import Path
+from typing import IO
 
 import pytest
 
+from fmqm_addon import folders
 from fmqm_addon.folders import TEMPORARY, own_folder, sweep
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -50,6 +53,27 @@ def test_a_folder_goes_with_its_owner_or_with_the_next_one(tmp_path: Path) -> No
     assert (left / "score").exists(), "another kind is swept"
     sweep(tmp_path, TEMPORARY)
     assert not list(tmp_path.iterdir())
+
+
+def test_who_sweeps_may_stand_still_with_a_lock(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A folder that was made without its lock would be taken for left by the next who sweeps."""
+    held: list[threading.Timer] = []
+    take = folders._lock
+
+    def held_by_another_at_first(file: IO[bytes]) -> bool:
+        if not held:
+            other = open(file.name, "rb+")  # noqa: SIM115
+            assert take(other)
+            held.append(threading.Timer(1, other.close))
+            held[0].start()
+        return take(file)
+
+    monkeypatch.setattr(folders, "_lock", held_by_another_at_first)
+    with own_folder(tmp_path, "other") as folder:
+        monkeypatch.undo()
+        held[0].join()
+        sweep(tmp_path, "other")
+        assert folder.exists()
 
 
 def test_the_next_one_sweeps_by_itself_but_not_what_could_be_adopted(tmp_path: Path) -> None:
