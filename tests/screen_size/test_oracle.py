@@ -58,7 +58,11 @@ def rendering(mesh: MeshArrays, center: Array, diagonal: float, axes: Array, siz
     corners = points[mesh.triangles]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     smooth = np.zeros_like(points)
-    np.add.at(smooth, mesh.triangles.ravel(), np.repeat(area, 3, axis=0))
+    for triangle, corner, face in zip(mesh.triangles, corners, area, strict=True):
+        for k in range(3):
+            one, other = (corner[(k + step) % 3] - corner[k] for step in (1, 2))
+            angle = np.arccos(one @ other / np.linalg.norm(one) / np.linalg.norm(other))
+            smooth[triangle[k]] += angle * face / np.linalg.norm(face)
     smooth /= np.linalg.norm(smooth, axis=1, keepdims=True)
     pixels = level(mesh, np.linalg.norm(area, axis=1), size)
     depth, light, shade = np.full((side, side), -np.inf), np.full((side, side, 3), 0.18), np.ones((side, side))

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import bmesh
 import bpy
 import numpy as np
 import pytest
@@ -15,9 +16,11 @@ from fmqm_addon.blender.materials.types import Reading
 from fmqm_addon.blender.scene.bvh import BVHQuery
 from fmqm_addon.blender.scene.mesh_arrays import mesh_arrays
 from fmqm_addon.comparison.candidates import moved
+from fmqm_addon.comparison.normals import corner_normals
 from fmqm_addon.metric.errors import SettingsError
 from fmqm_addon.metric.geometry import closest_on_triangles
 from fmqm_addon.metric.surface import prepare_surface
+from fmqm_addon.screen_size.definition import SMOOTH_ANGLE
 from fmqm_addon.screen_size.mipmaps import Mipmaps
 from fmqm_addon.screen_size.rasterize import rasterize
 from fmqm_addon.screen_size.render import image_side
@@ -89,6 +92,24 @@ def test_normals_turn_with_their_mesh_and_flat_parts_have_none() -> None:
     got = found.normals[:12] if found.normals[:12].any() else found.normals[12:]
     assert np.allclose(got / np.linalg.norm(got, axis=2, keepdims=True), unit(wanted), atol=1e-5)
     assert np.allclose(unit(moved(own, matrix).normals), unit(wanted), atol=1e-5)
+
+
+def test_a_mesh_without_normals_looks_as_blender_shades_it_smooth_by_the_same_angle() -> None:
+    """Or a LOD that was saved smooth would differ from an original that was saved without normals, though it be it."""
+    monkey = scenes.monkey()
+    monkey.matrix_world.identity()  # angles are the mesh's own, unstretched
+    shape = bmesh.new()
+    shape.from_mesh(monkey.data)
+    bmesh.ops.triangulate(shape, faces=shape.faces)
+    shape.to_mesh(monkey.data)
+    shape.free()
+    plain = mesh_arrays([monkey], "monkey", WITH_NORMALS)
+    monkey.data.shade_smooth()
+    monkey.data.set_sharp_from_angle(angle=np.radians(SMOOTH_ANGLE))
+    shaded = mesh_arrays([monkey], "monkey", WITH_NORMALS)
+    ours, blenders = (corner_normals(prepare_surface(each, BVHQuery), SMOOTH_ANGLE) for each in (plain, shaded))
+    assert plain.normals is None and shaded.normals is not None
+    assert np.abs(ours - blenders).max() < 1e-3
 
 
 def unit(normals: np.ndarray) -> np.ndarray:
