@@ -98,12 +98,8 @@ def overlapping_share(uv: Floats, layers: Ints) -> Work[float | None]:
     shift = np.array(_UV_SHIFT)[:, None]
     yield Progress("", 0.3)
     for side in UV_GRIDS:
-        first, last = low * side, high * side
-        np.ceil(np.subtract(first, shift, out=first), out=first)
-        np.floor(np.subtract(last, shift, out=last), out=last)
-        last -= first
-        last += 1
-        width, height = np.maximum(last, 0, out=last)
+        first, last = np.ceil(low * side - shift), np.floor(high * side - shift)
+        width, height = np.maximum(last - first + 1, 0)
         yield Progress("", 0.3)
         if float((width * height).sum()) <= UV_CELLS:
             break
